@@ -21,13 +21,16 @@ def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
         force[1:-1] = push(y[n:], u) - pull
         return np.concatenate([(force[:-1] - force[1:]) / m, u])
 
-    def kink(c, early):
-        """Tell where the force ends, also where its losses outweigh it."""
-        found = lambda _, y: y[n + c] + early * p * (y[c] - y[c + 1]) or 1.0  # noqa: E731
+    def kink(c, near, early):
+        """Tell where the force ends, also where its losses outweigh it; or where balls turn."""
+        found = lambda _, y: near * y[n + c] + early * (y[c] - y[c + 1]) or 1.0  # noqa: E731
         found.terminal = True
         return found
 
-    kinks = [kink(c, 0.0) for c in range(n - 1)] + [kink(c, loss[c]) for c in np.flatnonzero(loss)]
+    kinks = [kink(c, 1.0, 0.0) for c in range(n - 1)]
+    kinks += [kink(c, 1.0, p * loss[c]) for c in np.flatnonzero(loss)]
+    if pull.any():  # it ends when the last ones turn
+        kinks += [kink(c, 0.0, 1.0) for c in range(n - 1)]
     y, speed = np.concatenate([v, -gaps]), max(v[:-1] - v[1:])
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14 * speed}
     for _ in range(5000):
@@ -41,7 +44,7 @@ def integrated(m, v, k=1.0, p=1.5, loss=0.0, gaps=0.0):
             if ahead.any() and not ((u > 0) & (d == 0)).any():
                 y[n:] += u * (-d[ahead] / u[ahead]).min()
         y = solve_ivp(rate, (0, 1.0), y, events=kinks, **options).y[:, -1]
-        after = (push(y[n:], -np.diff(y[:n])) <= 1e-12) & (np.diff(y[:n]) > 0)
+        after = (push(y[n:], -np.diff(y[:n])) <= 1e-12) & (np.diff(y[:n]) > -1e-12 * speed)
         if not (pull.any() and after.all()):
             y = solve_ivp(rate, (0, 1e-4), y, **options).y[:, -1]  # beyond the kink
     raise AssertionError("the reference is not finished")

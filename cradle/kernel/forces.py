@@ -32,7 +32,8 @@ def idle(c, slow, s):
     u = a.v - s[c + 1].v
     if a.f == 0.0:
         return u <= 0.0
-    return abs(u) <= slow and abs(a.f - a.pull) * a.d * (a.w + s[c + 1].w) <= slow * slow
+    both = a.w + s[c + 1].w
+    return abs(u) + abs(a.spent) * both <= slow and abs(a.f - a.pull) * a.d * both <= slow * slow
 
 
 def done(c, beside, slow, s, leans):
@@ -325,7 +326,7 @@ def run(n, law, effort, s, clock, record):
             low -= 1
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if kinks > 0:
-            pay(n, p, h, kinks, slow, lossy, s)
+            pay(n, p, h, kinks, slow, lossy, clock.steps == 1, s)
         if lossy:
             kick_lossy(h, low, high, s)
         ended = parted(n, slow, s, clock) if leans else settled(slow, low, high, s)

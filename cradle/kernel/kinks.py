@@ -144,23 +144,22 @@ def zetas(p, theta):
 
 
 @apart
-def crossing(p, h, k, early, closes, theta, move):
+def crossing(p, h, k, early, closes, ends, theta, move):
     """Return the kick and the shift that a kink owes a contact: an impulse, and that times a time.
 
     It closes theta steps before this node, or reaches d = 0 theta steps after the last one, by
-    `move` a step.  With losses its force ends at d = `early` moves, and the rest of A f at once.
+    `move` a step.  With losses its force ends at d = `ends` moves, and the rest of A f at once.
     """
     unit = h * k * move * grade(p, move)
     one, two = zetas(p, theta)
     if closes:
         return -unit * one, h * unit * (two - (theta + early / p) * one)
-    cut = 0.0
-    if early > 0.0:
-        cut = early * early * grade(p, early) / (p + 1.0)
+    rest = ends * grade(p, ends) if ends > 0.0 else 0.0
+    cut = ends * rest / (p + 1.0)
     spent = one + cut
-    kick = cut * (p + 1.0) / p - spent
-    moment = two - early * one - early * cut / (p + 2.0)
-    return unit * kick, h * unit * ((1.0 - theta + early) * kick - moment - early / p * spent)
+    kick = early / p * rest - spent
+    moment = two - ends * one - ends * cut / (p + 2.0)
+    return unit * kick, h * unit * ((1.0 - theta + ends) * kick - moment - early / p * spent)
 
 
 def echo(p, x):
@@ -175,7 +174,7 @@ def echo(p, x):
     return 0.0
 
 
-def turning(a, early):
+def turning(a, early, soonest):
     """Return when, in steps from the last node on, d and `early` moves are 0; d there, its move.
 
     There the force with losses begins or ends; by Newton's method.
@@ -183,7 +182,7 @@ def turning(a, early):
     at, change = 0.5, 0.0
     d = move = 0.0
     for _ in range(5):
-        at = min(max(at - change, -1.0), 1.25)
+        at = min(max(at - change, soonest), 1.25)
         move = a.before + at * (a.bend + 0.5 * at * a.jerk)
         d = a.last + at * (a.before + at * (0.5 * a.bend + at * a.jerk / 6.0))
         slope = move + early * (a.bend + at * a.jerk)
@@ -202,7 +201,7 @@ def resumed(p, h, a, theta, d, move):
 
 
 @apart
-def pay(n, p, h, kinks, slow, lossy, s):
+def pay(n, p, h, kinks, slow, lossy, first, s):
     """Give back what the kinks of this step owe, where it can be noticed: kick and shift apart."""
     for i in range(kinks):
         c = s[i].kink
@@ -214,19 +213,21 @@ def pay(n, p, h, kinks, slow, lossy, s):
             d, move, early = a.y, a.y - a.last, a.early / h
             again = a.f > 0.0 and a.last > 0.0 and early > 0.0
             if again or (a.f == 0.0 and early > 0.0):
-                at, end, slant = turning(a, early)
+                at, end, slant = turning(a, early, 0.0 if first else -1.0)
         j = x = 0.0
         if again and end > 0.0:
             j, x = resumed(p, h, a, 1.0 - at, end, slant)
         elif early == 0.0 and h * a.k * abs(move) * grade(p, abs(move)) * (left + right) <= slow:
             continue
         elif a.f == 0.0 and end > 0.0 and slant < 0.0:
-            j, x = crossing(p, h, a.k, early, False, max(at - end / slant, 0.0), -slant)
+            ends = -end / slant
+            j, x = crossing(p, h, a.k, early, False, ends, max(at + ends, 0.0), -slant)
         elif a.f == 0.0 and move < 0.0:
-            j, x = crossing(p, h, a.k, early, False, max(1.0 - d / move, 0.0), -move)
+            ends = max(-d / move, 0.0) if early > 0.0 else 0.0
+            j, x = crossing(p, h, a.k, early, False, ends, max(1.0 - d / move, 0.0), -move)
         elif a.f > 0.0 and move > 0.0:
             theta, unit = min(max(d / move, 0.0), 1.0), h * a.k * grade(p, move)
-            j, x = crossing(p, h, a.k, early, True, theta, move)
+            j, x = crossing(p, h, a.k, early, True, 0.0, theta, move)
             if not lossy:
                 j += h * move * unit * unit * (left + right) * echo(p, theta)
         a.v -= j * left
