@@ -267,6 +267,24 @@ def test_what_still_swings_is_not_at_rest_while_another_contact_comes_back():
     assert abs(rough - fine).max() <= 1e-2
 
 
+@pytest.mark.parametrize(
+    ("m", "k", "p", "loss"),
+    [
+        ([1.42, 3.77, 0.182, 0.385], [1.52, 0.414, 3.84], 1.0, [0.179, 0.102, 0.18]),
+        ([0.318, 4.05, 1.17, 0.386, 0.138], [0.418, 0.362, 0.275, 1.02], 1.5,
+         [0.4, 0.391, 0.397, 0.271]),
+    ],
+)  # fmt: skip
+def test_a_swing_that_dies_out_ends_alike_at_any_accuracy(m, k, p, loss):
+    """The last two lean and swing, while the first fly apart under the pull of their strings."""
+    gaps = np.where(np.arange(len(k)) == len(k) - 2, 0.0, -0.01)
+    law = {"stiffness": k, "exponent": p, "viscosity": loss, "gaps": gaps}
+    best = spring_velocities(m, struck(len(m)), **law, accuracy=1e-5)
+    for accuracy in (1e-2, 1e-3, 1e-4):
+        found = spring_velocities(m, struck(len(m)), **law, accuracy=accuracy)
+        assert abs(found - best).max() <= accuracy
+
+
 def test_what_the_pull_of_strings_takes_is_lost_too():
     """Elastic balls that lean lose motion, though no viscosity takes it."""
     chain = Chain([1] * 5, struck(5))

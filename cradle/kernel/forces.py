@@ -33,7 +33,7 @@ def idle(c, slow, s):
     if a.f == 0.0:
         return u <= 0.0
     both = a.w + s[c + 1].w
-    return abs(u) + abs(a.spent) * both <= slow and abs(a.f - a.pull) * a.d * both <= slow * slow
+    return abs(u) + a.spent * both <= slow and a.f * a.d * both <= slow * slow
 
 
 def done(c, beside, slow, s, leans):
@@ -247,29 +247,27 @@ def parted(n, slow, s, clock):
     Then the pulls end.  Until then they alone act, so that balls fly at constant accelerations.
     """
     h = late = clock.h
-    soon = before = held = 0.0
-    swings = False
+    soon = before = held = swings = drawn = 0.0
     for i in range(n):
         a = s[i]
-        if a.f > 0.0 and not idle(i, slow, s):
-            return False
-        swings = swings or (a.f > 0.0 and not idle(i, min(slow, REST), s))
         push = a.f - a.pull
         a.dv = a.w * (before - push)
         a.free = a.v + a.w * (held - a.spent) - 0.5 * h * a.dv
         before, held = push, a.spent
     for c in range(n - 1):
         a = s[c]
-        if a.f > 0.0:
-            continue
         u, gain = a.free - s[c + 1].free, a.dv - s[c + 1].dv
+        if a.f > 0.0:
+            push = a.f - a.pull
+            swings = max(swings, u * u + push * push * (a.w + s[c + 1].w) / a.g)
+            continue
         y = a.y if clock.lossy else a.d + h * h / 12.0 * gain
         y, rate = y + a.early * u, u + a.early * gain
         root = rate * rate - 2.0 * gain * y
-        # What still swings goes on, while one that is pulled comes back.
         shut = y > 0.0 and not (root > 0.0 and rate > 0.0)
-        if shut or (u > 0.0 and gain <= 0.0) or (swings and gain > 0.0):
+        if shut or (u > 0.0 and gain <= 0.0):
             return False
+        drawn = max(drawn, gain)
         # It opened where d + p A u was 0 (or d), and may by now be closed again.
         if root > 0.0 and gain > 0.0:
             late = min(late, (rate + math.sqrt(root)) / gain)
@@ -279,9 +277,12 @@ def parted(n, slow, s, clock):
             soon = max(soon, u / gain)
         elif gain < 0.0:
             late = min(late, u / gain)
-    for i in range(n if soon <= late else 0):
+    # What still swings goes on, while one that is pulled comes back.
+    rest = min(slow, REST) if drawn > 0.0 else slow
+    ended = soon <= late and swings <= rest * rest
+    for i in range(n if ended else 0):
         s[i].v = s[i].free - late * s[i].dv
-    return soon <= late
+    return ended
 
 
 @apart
