@@ -8,7 +8,7 @@ amplify it, those that strings pull swing long: then finer and finer runs tell.
 
 import math
 
-from cradle.kernel.forces import begin, put_down, run
+from cradle.kernel.forces import REST, begin, put_down, run
 from cradle.kernel.kinks import FAINT, Springs, grade
 from cradle.kernel.state import (
     ENERGY,
@@ -192,6 +192,7 @@ def defect_of(n, law, s, clock):
     """Return what the outcome breaks, or 0: order, momentum, energy."""
     rounding = 2.0**-52 * (64.0 + clock.effort)
     size = change = gained = energy = 0.0
+    slowest = max(FAINT * law.accuracy, REST if clock.leans > 0.0 else 0.0)
     ordered = True
     for i in range(n):
         a = s[i]
@@ -201,7 +202,7 @@ def defect_of(n, law, s, clock):
         gained += m * (v - old) * 0.5 * (v + old)
         energy += m * old * old
         if i < n - 1:
-            ordered = ordered and s[i + 1].after - v >= -FAINT * law.accuracy
+            ordered = ordered and s[i + 1].after - v >= -slowest
     slack = law.accuracy * size + rounding * energy
     if not (ordered or law.once):
         return ORDER

@@ -278,7 +278,7 @@ def parted(n, slow, s, clock):
         elif gain < 0.0:
             late = min(late, u / gain)
     # What still swings goes on, while one that is pulled comes back.
-    rest = min(slow, REST) if drawn > 0.0 else slow
+    rest = REST if drawn > 0.0 else slow
     ended = soon <= late and swings <= rest * rest
     for i in range(n if ended else 0):
         s[i].v = s[i].free - late * s[i].dv
