@@ -68,6 +68,14 @@ def test_strokes_and_fig_toy_models():
         np.testing.assert_allclose(row, after[stroke - 1], rtol=0, atol=5.1e-4)
     inner = 100 * (after[:, 1:4] ** 2).sum(axis=1)
     CHAPTER.tells({"inner-first": inner[0], "inner-twenty": inner[19]})
+    # To the left balls 1 and 2 come to one speed, and keep it nearly.
+    one, two = -after[1::2, :2].T
+    pair = int(glued("pair-from")) // 2 - 1
+    assert (np.diff(one[: pair + 1]) < 1e-3).all()
+    assert (np.diff(two[: pair + 1]) > -1e-3).all()
+    assert abs(one - two)[:pair].min() > 0.01 > abs(one - two)[pair]
+    assert abs(one - two)[pair:].max() < 0.04
+    CHAPTER.tells({"pair-speed": one[pair]})
 
 
 def test_mirror():
