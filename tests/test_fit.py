@@ -606,6 +606,25 @@ def test_velocities_from_exact_tracks(monkeypatch, length):
     np.testing.assert_allclose(from_right.after, -found.after[::-1], atol=1e-9)
 
 
+def test_velocities_of_balls_lifted_together():
+    """Ball 1 comes .6 mm behind ball 2, so that its impact is .9 ms later: a part of a frame."""
+    after, times = np.array([-0.03, 0.12, 0.6, 0.69]), (np.arange(121) - 60.3) / 240
+    noise, tracks = np.random.default_rng(5).normal(0.0, 4e-4, (4, 121)), {}
+    for k, late in enumerate([0.0006 / 0.7, 0.0, 0.0, 0.0]):
+        t, before = times - late, 0.7 if k < 2 else 0.0
+        way = np.where(t < 0, fit_example.swing(before, t), fit_example.swing(after[k], t))
+        tracks["ABCD"[k]] = Track(times, 0.022 * k + way + noise[k])
+    found = velocities_from_tracks(tracks, length=fit_example.LENGTH, striker=(0, 1))
+    assert (abs(found.after - after) < 4 * found.sigma).all()
+    assert (abs(found.before - [0.7, 0.7, 0, 0]) <= 4 * found.sigma_before).all()
+    assert found.sigma.max() < 0.002
+    mirrored = {name: Track(t, -x) for name, (t, x) in reversed(tracks.items())}
+    from_right = velocities_from_tracks(mirrored, length=fit_example.LENGTH, striker=[2, 3])
+    np.testing.assert_allclose(from_right.before, -found.before[::-1], atol=1e-6)
+    with pytest.raises(ValueError, match="striker = 4; must be a whole number, from 0 to 3"):
+        velocities_from_tracks(tracks, striker=(0, 4))
+
+
 @pytest.mark.parametrize(("rate", "count"), [(30, 20), (60, 20), (240, 40)])
 def test_errors_of_velocities_are_those_of_the_marks(monkeypatch, rate, count):
     """The squares of errors over their standard errors average to 1, within four of its errors."""

@@ -35,13 +35,13 @@ class Velocities(NamedTuple):
 
 def velocities_from_tracks(
     tracks: Mapping[str, Track], *, length: float | None = None, window: float | None = None,
-    striker: int | None = None, scatter: float | None = None,
+    striker: int | Sequence[int] | None = None, scatter: float | None = None,
 ) -> Velocities:  # fmt: skip
     """Find the impact in the tracks, and the velocities just before and just after it.
 
     First the moment is fitted at which all tracks bend, then the velocity of each ball by itself on
-    either side of it, so that the errors are independent.  Before the impact all balls but the
-    striker must rest.  A mark farther off than chance allows is named in a warning.  Fewer than two
+    either side of it, so that the errors are independent.  Before the impact all balls that do not
+    strike must rest.  A mark farther off than chance allows is named in a warning.  Fewer than two
     balls, too few marks on either side, and marks that do not lie on such a motion raise a
     ValueError (of right films, one in a hundred thousand is refused).
 
@@ -55,8 +55,9 @@ def velocities_from_tracks(
     window : float, optional
         How much time before and after the impact is used, s.  If left out, the longest one that the
         marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
-    striker : int, optional
-        Index of the ball that moves before; if left out, the one whose marks move most.
+    striker : int or sequence of int, optional
+        Index of the ball that moves before, or of those lifted together, as (0, 1); if left out,
+        the one whose marks move most.
 
     Examples
     --------
@@ -69,9 +70,9 @@ def velocities_from_tracks(
     balls = list(tracks.values())
     if len(balls) < 2:
         raise ValueError(f"{len(balls)} tracks; needs two balls and more")
-    if striker is not None:
-        last = len(balls) - 1
-        striker = whole_number("striker", striker, f"from 0 to {last}", 0, last)
+    some = striker if isinstance(striker, Sequence) else [] if striker is None else [striker]
+    last = len(balls) - 1
+    movers = [whole_number("striker", k, f"from 0 to {last}", 0, last) for k in some]
     given = {"length": length, "window": window, "scatter": scatter}
     length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
                                for name, value in given.items())  # fmt: skip
@@ -83,7 +84,7 @@ def velocities_from_tracks(
             raise ValueError(f"{told}; say the unit of the positions")
     frame = max(float(np.median(np.diff(ball.times))) for ball in balls)
     least = window or max(0.05, (_LEAST + 0.5) * frame)
-    coarse, striker = _coarse(balls, striker, least)
+    coarse, movers = _coarse(balls, movers, least)
     longest = _LONGEST if length is None else 0.5 * np.pi * float(np.sqrt(length / _GRAVITY))
     tried = [window or max(longest, least)]
     for away in (ball.times - coarse for ball in balls):  # frames may be missing
@@ -93,7 +94,7 @@ def velocities_from_tracks(
         tried.append(0.8 * tried[-1])
     fits = list[Velocities]()
     for wide in tried:
-        fits.append(_around(tracks, coarse, wide, length, striker))
+        fits.append(_around(tracks, coarse, wide, length, movers))
         if fits[-1].probability > (0.2 if fits[1:] else 0.01):
             break
     first, found, k = fits[0], fits[-1], len(fits) - 1
@@ -101,12 +102,12 @@ def velocities_from_tracks(
     # power 3.5.  Without so many the shortest will do if chance may have bent the longest.
     safe = not k or k + 3 < len(tried)
     if k and found.window > (wide := tried[k + 3] if safe else tried[-1]):
-        found = _around(tracks, coarse, wide, length, striker)
+        found = _around(tracks, coarse, wide, length, movers)
     refused = found.probability < _CHANCE or not (safe or first.probability >= _CHANCE)
     wrong = "; ".join(f"the mark of {list(tracks)[ball]} at {moment:.4g} s is off by {off:.2g} m"
                       for ball, moment, off in (first if refused else found).strays)  # fmt: skip
     if refused:
-        rather = "are length and frame rate right, and is there one impact"
+        rather = "are length and frame rate right, is there one impact, are all strikers named"
         told = f"window = {tried[0]:.3g} s; the marks bend otherwise than by such a motion: if the "
         told += f"balls hang, {rather if length else 'give their length'}; else give a shorter"
         raise ValueError(f"{told} window{wrong and '; or '}{wrong}")
@@ -123,8 +124,8 @@ def velocities_from_tracks(
     return found._replace(sigma=sigma, sigma_before=sigma_before)
 
 
-def _coarse(balls: list[Track], striker: int | None, window: float) -> tuple[float, int]:
-    """Return the moment at which a bend in all tracks explains most, and the ball moving before."""
+def _coarse(balls: list[Track], movers: list[int], window: float) -> tuple[float, list[int]]:
+    """Return the moment at which a bend in all tracks explains most, and who moves before."""
     moments = np.unique(np.concatenate([ball.times for ball in balls]))
     best, most = None, -np.inf
     for moment in 0.5 * (moments[:-1] + moments[1:]):
@@ -138,9 +139,9 @@ def _coarse(balls: list[Track], striker: int | None, window: float) -> tuple[flo
             still = _rest([later, later**2], x)
             gain += _rest([t, t**2], x) - still
             moved.append(still - _rest([later, later**2, earlier, earlier**2], x))
-        first = int(np.argmax(moved)) if striker is None else striker
-        if gain + moved[first] > most:
-            best, most = (float(moment), first), gain + moved[first]
+        first = movers or [int(np.argmax(moved))]
+        if (gain := gain + sum(moved[k] for k in first)) > most:
+            best, most = (float(moment), first), gain
     if best is None:
         raise ValueError(f"no moment has 4 marks of every ball within {window:g} s on either side")
     return best
@@ -165,7 +166,7 @@ def _way(t: Vector, velocity: float, length: float | None) -> Vector:
 
 
 def _around(
-    tracks: Mapping[str, Track], time: float, window: float, length: float | None, striker: int
+    tracks: Mapping[str, Track], time: float, window: float, length: float | None, movers: list[int]
 ) -> Velocities:
     """Fit the moment in a window, then every ball on its own, place free, on either side of it."""
     for _ in range(3):  # the window moves with the moment that is found in it
@@ -178,7 +179,7 @@ def _around(
                 told += f" within window = {window:g} s; needs {_LEAST} on each side"
                 raise ValueError(f"track {name!r} has {told}")
             used.append(Track(t[near], x[near]))
-        time, places = _moment(used, time, length, striker)
+        time, places = _moment(used, time, length, movers)
     if (np.diff(places) <= 0).any():
         rule = "in the order of the balls, left to right, all from one origin, x to the right"
         told = f"the balls meet at {(0.0 + places.round(4)).tolist()} m"
@@ -191,7 +192,7 @@ def _around(
         half = 0.5 * float(np.median(np.diff(t)))
         for side, some in enumerate([t > half, t < -half]):
             times, x, v = t[some], ball.positions[some], 0.0
-            if side and k != striker:
+            if side and k not in movers:
                 sides.append((k, ball.times[some], times, x))
                 continue
             for _ in range(12):  # Newton's steps: how a wide swing bends depends on its velocity
@@ -215,21 +216,23 @@ def _around(
 
 
 def _moment(
-    balls: list[Track], time: float, length: float | None, striker: int
+    balls: list[Track], time: float, length: float | None, movers: list[int]
 ) -> tuple[float, Vector]:
     """Return the moment of the impact and the balls' places then: all tracks meet there."""
+    end = 1 + 2 * len(balls)
 
-    def residuals(p: Vector) -> Vector:  # moment, velocity before, then after and place of each
-        left = [x - place - _way(np.maximum(t - p[0], 0.0), v, length)
-                for (t, x), v, place in zip(balls, p[2::2], p[3::2], strict=True)]  # fmt: skip
-        left[striker] -= _way(np.minimum(balls[striker].times - p[0], 0.0), p[1], length)
+    def residuals(p: Vector) -> Vector:  # moment, velocity after and place of each, then before
+        ways = zip(balls, p[1:end].reshape(-1, 2), strict=True)
+        left = [x - at - _way(np.maximum(t - p[0], 0.0), v, length) for (t, x), (v, at) in ways]
+        for k, v in zip(movers, p[end:], strict=True):
+            left[k] -= _way(np.minimum(balls[k].times - p[0], 0.0), v, length)
         return np.concatenate(left)
 
     lines = [np.polyfit(t[t >= time] - time, x[t >= time], 1) for t, x in balls]
-    t, x = balls[striker]
-    begin = [time, np.polyfit(t[t < time] - time, x[t < time], 1)[0], *np.ravel(lines)]
+    sides = [(t[t < time] - time, x[t < time]) for t, x in (balls[k] for k in movers)]
+    begin = [time, *np.ravel(lines), *(np.polyfit(t, x, 1)[0] for t, x in sides)]
     found = scipy.optimize.least_squares(residuals, begin, x_scale="jac").x
-    return float(found[0]), found[3::2]
+    return float(found[0]), found[2:end:2]
 
 
 def _strays(sides: list[tuple[int, Vector, Vector, Vector]], exact: float) -> tuple[_Stray, ...]:
