@@ -653,7 +653,8 @@ def test_a_window_that_does_not_fit(monkeypatch):
             velocities_from_tracks(tracks)
         with pytest.raises(
             ValueError,
-            match=r"window = 0.2 s; .* rate right, is there one impact, are all strikers named",
+            match=r"window = 0.2 s; .* are length and frame rate right, "
+            r"is there one impact, are all strikers named",
         ):
             velocities_from_tracks(tracks, length=0.2, window=0.2)
         # A wall at 0.15 s: what is after it is not used.

@@ -21,7 +21,7 @@ from cradle.kernel.accuracy import MOST_HUNT
 LAW = {"damping": "hunt-crossley"}
 
 
-@pytest.mark.parametrize(("x", "p"), [*itertools.product((0.05, 1.5, 9.9), (1.0, 1.5, 2.2))])
+@pytest.mark.parametrize(("x", "p"), [*itertools.product((0.05, 0.9, 1.5, 9.9), (1.0, 1.5, 2.2))])
 def test_two_balls_by_closed_form(x, p):
     """Whatever the masses, the stiffness and the exponent."""
     (left, right), error = spring_outcomes(
@@ -31,7 +31,7 @@ def test_two_balls_by_closed_form(x, p):
     assert 0 < error <= 1e-9
 
 
-@pytest.mark.parametrize("e", [0.11, 0.49, 0.9, 1 - 1e-6, 1.0])
+@pytest.mark.parametrize("e", [0.11, 0.49, 0.63, 0.9, 1 - 1e-6, 1.0])
 def test_viscosity_that_gives_a_restitution(e):
     viscosity = viscosity_from([e, 0.8], speed=2.0, masses=[1, 3, 1], stiffness=1e6, **LAW)
     if e < 0.9999:

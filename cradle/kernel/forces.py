@@ -21,8 +21,7 @@ from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, apart
 # A run begins, and a flight ends, so many steps before the first node that is to find a contact
 # closed: there a closing owes least to the next order.
 AHEAD = 0.8
-# Speed below which a contact rests while others are pulled back, whatever the accuracy.
-REST = 1e-7
+REST = 1e-7  # speed below which a contact rests while others are pulled back, at any accuracy
 PULLS = 9  # why a chain is refused on its way, after the rules of `accuracy`
 
 
@@ -251,6 +250,8 @@ def parted(n, slow, s, clock):
     for i in range(n):
         a = s[i]
         push = a.f - a.pull
+        if a.f > 0.0 and push * push * a.w > max(slow, REST) * max(slow, REST) * a.g:
+            return False  # most steps end here
         a.dv = a.w * (before - push)
         a.free = a.v + a.w * (held - a.spent) - 0.5 * h * a.dv
         before, held = push, a.spent
@@ -278,8 +279,7 @@ def parted(n, slow, s, clock):
         elif gain < 0.0:
             late = min(late, u / gain)
     # What still swings goes on, while one that is pulled comes back.
-    rest = REST if drawn > 0.0 else slow
-    ended = soon <= late and swings <= rest * rest
+    ended = soon <= late and swings <= (REST * REST if drawn > 0.0 else slow * slow)
     for i in range(n if ended else 0):
         s[i].v = s[i].free - late * s[i].dv
     return ended

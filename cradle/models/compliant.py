@@ -139,8 +139,8 @@ def spring_velocities(
         impact, m.  With the speed u and the reduced mass m of the contact that closes fastest, the
         unit of compression is L = (m u^2 / k)^(1 / (p + 1)).  A is at most 10 L / u, and a gap
         matters if it is not small beside L.  A gap below zero, a lean, says how far strings press
-        two balls together at rest, at most L; they pull until no contact pushes and none closes;
-        one that leans may swing on by 1e-7 of the fastest closing speed.
+        two balls together, at most L; they pull until no contact pushes, or swings by more than
+        1e-7 of the fastest closing speed, and none closes.
     exponent : float
         p, from 1 to 10.
     damping : {"viscoelastic", "hunt-crossley"}
