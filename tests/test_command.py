@@ -15,6 +15,7 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
+import fit_example
 import numpy as np
 import pandas as pd
 import pytest
@@ -522,6 +523,29 @@ def test_a_pendulum_does_not_swing_over_the_top(capsys):
     with pytest.raises(SystemExit):
         run(shlex.split(f"{BAC} --slower 100".replace("--length 0.3", "--length 0.2")))
     assert re.search(r"film.txt: \S+ m/s is unlikely; see --slower", capsys.readouterr().err)
+
+
+def test_a_film_of_two_lifted(folder, capsys):
+    """As by pairs, the last two leave."""
+    times = (np.arange(81) - 40.3) / 240
+    way = np.array([fit_example.swing(0.7, times) * some for some in (times < 0, times > 0)])
+    places = way[[0, 0, 1, 1]] + 0.022 * np.arange(4)[:, None]
+    places += np.random.default_rng(1).normal(0, 1e-4, places.shape)
+    lines = ["\t".join(f"{x:.7f}" for x in row) for row in np.column_stack([times, *places])]
+    film = "\n".join(["t\tA/x\tB/x\tC/x\tD/x", *lines])
+    (folder / "two.txt").write_text(film, encoding="utf-8")
+    line = "film two.txt --set ABCD --masses 1,1,1,1 --length 0.3"
+    with pytest.raises(SystemExit):
+        run(shlex.split(f"{line} --striker 1 --striker 2"))
+    printed = capsys.readouterr()
+    rows = [row.split(",") for row in printed.out.splitlines()]
+    before, after = np.array([row[5:7] for row in rows], float).T
+    np.testing.assert_allclose(before, [0.7, 0.7, 0, 0], atol=2e-3)
+    np.testing.assert_allclose(after, [0, 0, 0.7, 0.7], atol=2e-3)
+    assert "two.txt: balls 1 and 2 strike at " in printed.err
+    with pytest.raises(SystemExit):
+        run(shlex.split(f"{line} --striker 0"))
+    assert "--striker = 0; must be a whole number, from 1 to 4" in capsys.readouterr().err
 
 
 def test_fit_of_a_swing(folder):

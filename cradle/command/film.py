@@ -13,7 +13,7 @@ import cradle
 from cradle.command.console import format_options, plotted, save, show
 from cradle.command.describe import UNITS, numbers_of, one_or_all, pendulum_length, swing_options
 from cradle.command.fit import named_number
-from cradle.input.values import ABOVE_ZERO, checked_masses, one_number
+from cradle.input.values import ABOVE_ZERO, checked_masses, one_number, whole_number
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -47,20 +47,22 @@ def _units(position_unit: str | None, scale: float | None, slower: float) -> dic
 @click.option("--unit", type=click.Choice(list(UNITS)), help="Of masses [kg].")
 @swing_options("or --period, or --level")
 @click.option("--level", is_flag=True, help="The balls do not hang: they roll on a level track.")
+@click.option("--striker", multiple=True, type=int, help="Each ball lifted, if there are several: "
+              "--striker 1 --striker 2 [the one that moves most].")  # fmt: skip
 @_track_options
 @click.option("--window", type=float, help="Time used before and after, s [the longest that fits].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
     files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str | None,
     header: bool, length: float | None, period: float | None, level: bool, window: float | None,
-    **options: Any,
+    striker: Sequence[int], **options: Any,
 ) -> None:  # fmt: skip
     """Velocities from the marks in films, a film a shot.
 
     FILES are exported by Tracker, Kinovea, Logger Pro or Capstone, one track a ball, left to right;
-    tracks named by types are in the order of --set.  One ball strikes the others at rest, from
-    either end.  Prints rows for the table that `cradle fit` reads; what was used of each film, and
-    what is wrong with one, goes to standard error.
+    tracks named by types are in the order of --set.  One ball strikes the others at rest, or some
+    together (--striker), from either end.  Prints rows for the table that `cradle fit` reads; what
+    was used of each film, and what is wrong with one, goes to standard error.
 
     \b
     Examples:
@@ -83,7 +85,7 @@ def film(
     writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
     for file in files:
         try:
-            told, one = _velocities(file, types, masses, units, length, window)
+            told, one = _velocities(file, types, masses, units, length, window, striker)
         except (ValueError, OSError) as reason:  # the other films may be right
             named = str(reason).startswith(file.name)
             wrong.append(str(reason) if named else f"{file.name}: {reason}")
@@ -94,8 +96,9 @@ def film(
         measured = one.before, one.after, one.sigma, one.sigma_before
         for k, (kind, *numbers) in enumerate(zip(types, kilograms, *measured, strict=True), 1):
             writer.writerow([name, shot or file.stem, k, kind, *(f"{x:.6g}" for x in numbers)])
-        striker = max(range(len(types)), key=lambda k: abs(one.before[k])) + 1
-        when = f"ball {striker} strikes at {one.time:.4g} s, marks within {one.window:.3g} s"
+        who = " and ".join(str(k + 1) for k in one.before.nonzero()[0])
+        who = f"balls {who} strike" if len(striker) > 1 else f"ball {who} strikes"
+        when = f"{who} at {one.time:.4g} s, marks within {one.window:.3g} s"
         how = f"marks scatter by {one.scatter:.2g} m; chance of such a fit {one.probability:.2g}"
         click.echo(f"{file.name}: {when}, {how}{told}", err=True)
     if unit is None and len(wrong) < len(files):
@@ -106,7 +109,7 @@ def film(
 
 def _velocities(
     file: Path, types: tuple[str, ...], masses: list[float], units: dict[str, float],
-    length: float | None, window: float | None,
+    length: float | None, window: float | None, striker: Sequence[int],
 ) -> tuple[str, Any]:  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
     import numpy as np
@@ -124,9 +127,11 @@ def _velocities(
     fastest = max(float(np.ptp(x) / (np.ptp(t) or 1.0)) for t, x in tracks.values())
     if length is None and fastest > 20.0:  # a pendulum's length tells by itself
         raise ValueError(f"{fastest:.3g} m/s is unlikely; say the unit of the positions")
+    n = len(tracks)
+    movers = [whole_number("--striker", k, f"from 1 to {n}", 1, n) - 1 for k in striker] or None
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        found = velocities_from_tracks(tracks, length=length, window=window)
+        found = velocities_from_tracks(tracks, length=length, window=window, striker=movers)
     return "".join(f"; {one.message}" for one in told), found
 
 
