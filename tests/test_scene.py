@@ -344,6 +344,7 @@ def test_depths_of_the_program():
     depth = 1e6 * (impact.forces.max() / 1e10) ** (2 / 3)
     for name in ("scene", "recipe"):
         Chapter(name).tells({"depth": depth}, off=0.05)
+    assert Chapter("scene").glued["toy-half"] == Chapter("trade").glued["toy-half"]
 
 
 def test_the_judge_of_outer_balls_apart():
