@@ -326,7 +326,8 @@ def test_the_printed_calls():
     for line, (law, found) in zip(lines, expected.items(), strict=True):
         assert line.strip().startswith(law)
         said = numbers(line.replace(law, "", 1))
-        np.testing.assert_allclose(said, 100 * found, rtol=0, atol=0.13)
+        small_steps = law == "energy law"
+        np.testing.assert_allclose(said, 100 * found, rtol=0, atol=0.13 if small_steps else 0.06)
 
 
 def test_how_wide_far_is():
