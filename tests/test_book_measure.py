@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import real_cradles
 from chapters import BOOK, Chapter, floats
-from scipy.special import ndtri
+from scipy.special import gammaincc, ndtri
 from scipy.stats import norm
 from stored import DATA, read
 from truth import solve
@@ -160,14 +160,24 @@ def test_the_left_out_set_by_another_integration():
     noise = sigma * ndtri(np.random.default_rng(3).random(sigma.shape))
     film = noise + [struck(600, 0.5, 30, speed) for speed in speeds]
     numbers = [float(x) for x in re.findall(r"(?:apart|_4|viscosity) = ([\d.]+)", found)]
-    (tested,) = re.findall(r"test: chi-square (\d+)", found)
-    for law, three in (("a gap each", numbers[:3]), ("touching spheres", [900, 0, 0])):
-        (told,) = re.findall(rf"(?m)^{law} +\d+ +\d+ +(\d+)", found)
+    judged = {
+        law: (*map(int, sums), verdict)
+        for law, *sums, verdict in re.findall(
+            r"(?m)^ *(\S.*?) +(\d+) / (\d+) +(\d+) / (\d+) +(yes|no)$", found
+        )
+    }
+    for law, three in (("gaps", numbers[:3]), ("touching spheres", [900, 0, 0])):
+        *_, told, free, _ = judged[law]
         off = (film - [struck(*three, speed) for speed in speeds]) / sigma
         # Of touching spheres the page prints no numbers: none is near enough.
-        right = law == "a gap each"
-        assert (off**2).sum() == pytest.approx(float(told), rel=0.02 if right else 0.3)
-        assert (told == tested) == right
+        right = law == "gaps"
+        assert (off**2).sum() == pytest.approx(told, rel=0.02 if right else 0.3)
+        assert free == off.size
+    # The others miss both: far above what a right law has by chance.
+    assert len(judged) == 5
+    for law, (fit, n, test, free, verdict) in judged.items():
+        passes = gammaincc(n / 2, fit / 2) > 0.05 and gammaincc(free / 2, test / 2) > 0.05
+        assert (verdict == "yes") == passes == (law == "gaps")
     # Ratios see of the same film balls 3, 4 and 5 only; then balls 2 and 1 follow, pair by pair.
     lossy, tried = 0.9978, np.linspace(0.05, 0.25, 81)
 
@@ -194,10 +204,10 @@ def test_the_left_out_set_by_another_integration():
     one, four = float(GLUED["ratio-one"]), float(GLUED["ratio-four"])
     assert abs(one - best) < 0.02 < four - best
     for ratio, law in ((one, "one ratio"), (four, "a ratio each")):
-        (told,) = re.findall(rf"(?m)^{law} +\d+ +\d+ +(\d+)", found)
+        *_, told, _, _ = judged[law]
         rounded = np.abs(tried - ratio) < 0.006
         ends = np.array(off)[rounded]
-        assert 0.97 * ends.min() < float(told) < 1.03 * ends.max(), law
+        assert 0.97 * ends.min() < told < 1.03 * ends.max(), law
     # Two balls with this loss alone.
     unit = (0.0448 * 0.7**2 / stiffness) ** 0.4
     first, second = real_cradles.spheres([1.0, 0.0], [0.0], 3e-8 * 0.7 / unit)

@@ -12,6 +12,8 @@ from scipy.optimize import brentq
 
 PAGE = Chapter("observations")
 BOOK = Path(__file__).parents[1] / "book"
+#: Of two balls, in the unit of the integrators, (m v² / k)^0.4.
+DEPTH = 0.625**0.4
 
 
 def verdicts():
@@ -56,6 +58,21 @@ def test_which_law_agrees(row):
         elif words[:4] == "from":
             words = f"gap > {words.split()[1]}"
         assert at_the_end == shown.get(words, words)
+
+
+def test_the_lines_of_the_page_list_every_law_once():
+    """Those that agree with their conditions, the others with what they say instead."""
+    for number in range(1, 7):
+        yes, no = (re.split("[,;:] ", PAGE.glued[f"{way}-{number}"]) for way in ("yes", "no"))
+        cells = {law: words[number - 1] for law, *words in told("again")}
+        agree = {law: words for law, words in cells.items() if words[0] in "✓eag"}
+        shown = {law: "" if words[0] in "✓a" else f" if {words}" for law, words in agree.items()}
+        assert yes == [law + words for law, words in shown.items()]
+        assert {law.removesuffix(" (contact 2‑3 stays closed)") for law in no} - {
+            "none", "silent"
+        } == cells.keys() - agree.keys()  # fmt: skip
+        assert ("silent" in no) == ("–" in cells.values())
+        assert any("stays closed" in law for law in no) == ("stays closed" in cells.values())
 
 
 E = np.round(np.arange(0.71, 1, 0.02), 2)
@@ -139,9 +156,12 @@ def test_a_gap_decides():
         a = lossy(e)
         return brentq(lambda gap: spheres([1, 0, 0], [0, gap], a)[0], 0.05, 0.6)
 
-    assert float(verdicts()[3]["spheres"].split()[1]) == pytest.approx(least(0.95), abs=6e-3)
+    told = float(verdicts()[3]["spheres"].split()[1])
+    assert told == pytest.approx(least(0.95) / DEPTH, abs=6e-3)
     assert PAGE.glued["least"] == verdicts()[3]["spheres"].split()[1]
-    assert shown("more") + shown("less") == pytest.approx([least(0.9), least(0.99)], abs=6e-3)
+    assert shown("more") + shown("less") == pytest.approx(
+        [least(0.9) / DEPTH, least(0.99) / DEPTH], abs=6e-3
+    )
 
 
 def test_fig_gap():
@@ -149,7 +169,7 @@ def test_fig_gap():
     loss = lossy(0.95)
     axes = PAGE.figures["fig-observations-gap"].axes
     caption = PAGE.cells["fig-gap"].metadata.mystnb.figure.caption
-    for later, gap in zip(axes[1::2], (0, 0.5), strict=True):
+    for later, gap in zip(axes[1::2], (0, 0.5 * DEPTH), strict=True):
         v = spheres([1, 0, 0], [0, gap], loss)
         told = [x.get_text() for x in later.texts if "%" in x.get_text()]
         assert told == [f"{100 * x:.0f} %".replace("-", "−") for x in v]
