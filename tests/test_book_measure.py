@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import real_cradles
 from chapters import BOOK, Chapter, floats
+from commands import call
 from scipy.special import gammaincc, ndtri
 from scipy.stats import norm
 from stored import DATA, read
@@ -225,3 +226,32 @@ def test_at_ratios_below_that_of_bac_the_first_two_balls_collide_twice():
         assert count == (2 if ratio < 0.0859 else 1)
     slow, quick = (np.linalg.norm(here[b] - here[a]) for a, b in ((0.07, 0.08), (0.09, 0.1)))
     assert slow < 0.75 * quick
+
+
+def test_the_commands_of_the_page_run_one_after_the_other(tmp_path, monkeypatch):
+    """Two films begin a table, to which the shots of the page are added; then all is fitted."""
+    blocks = re.findall(r"(?s)```text\n(.*?)```", CHAPTER.cells["commands"].source)
+    lines = "".join(blocks).splitlines()
+    monkeypatch.chdir(tmp_path)
+    film = (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
+    for name in ("one.txt", "two.txt"):
+        (tmp_path / name).write_text(film, encoding="utf-8")
+    told = {}
+    for line in lines:
+        command, _, target = re.fullmatch(r"cradle (.*?)(?: (>>?) (\S+))?", line).groups()
+        if command.startswith("fit-swing"):
+            continue  # a film of a swing is fitted elsewhere
+        if "all.csv" in command:
+            _, *more = (DATA / "shots_synthetic.csv").read_text(encoding="utf-8").split("\n", 2)
+            with (tmp_path / "all.csv").open("a", encoding="utf-8") as file:
+                file.write(more[1])
+        told[line] = call(command)
+        if target:
+            with (tmp_path / target).open("a", encoding="utf-8") as file:
+                file.write(told[line])
+    table = (tmp_path / "all.csv").read_text(encoding="utf-8").splitlines()
+    assert table[0] == "set,shot,ball,type,mass,before,after,sigma,sigma_before"
+    assert [line[:7] for line in table[1:5]] == ["BAC,one"] * 3 + ["BAC,two"]
+    (last,) = (words for line, words in told.items() if "all.csv" in line and " fit " in line)
+    assert "ABACA" in last
+    assert (tmp_path / "fit.png").is_file()

@@ -388,6 +388,29 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     CHAPTER.tells({"apart": real_cradles.APART * unit})
 
 
+def test_the_jump_where_the_fit_changes_over_between_two_sets_of_gaps():
+    """Each set, sought by the fitting script on both sides, and tested by another integrator."""
+    *rows, _ = numbers("film_distances.csv")
+    at = next(k for k, row in enumerate(rows) if 1e3 * UNIT * row["apart"] > 0.095)
+    sides, data = {"near": rows[at - 1], "far": rows[at]}, first_strikes(4)
+    for home, name in (("near", "wide"), ("far", "narrow")):
+        _, _, _, *start = sides[home].values()
+        for side, row in sides.items():
+            CHAPTER.tells({f"jump-{side}": 1e3 * UNIT * row["apart"]})
+            fit, p = real_cradles.best_at(row["apart"], data, [start])
+            CHAPTER.tells({f"jump-{side}-{name}": fit}, off=0.02)
+            CHAPTER.tells({f"jump-{name}": 1e6 * UNIT * p[2]}, off=0.03)
+            v = real_cradles.by_spheres(np.abs(p), 3, True)
+            test = (real_cradles.misfits(lambda _, v=v: v, {3: data[3]}, (3,)) ** 2).sum()
+            assert (gammaincc(2, test / 2) > 0.05) == (name == "narrow")
+    told = {k: float(x) for k, x in GLUED.items() if re.fullmatch("jump-(near|far)-.*", k)}
+    assert told["jump-near-wide"] < told["jump-near-narrow"]
+    assert told["jump-far-narrow"] < told["jump-far-wide"]
+    wanted, error = float(GLUED["gap-wanted"]), float(GLUED["gap-wanted-error"])
+    assert abs(float(GLUED["jump-narrow"]) - wanted) < error
+    assert float(GLUED["jump-wide"]) - wanted > 5 * error
+
+
 def test_a_softer_first_touch():
     """Balls that push by d^p, integrated here; the loss that fits best at about the best p."""
     power = 1.74
