@@ -12,10 +12,10 @@ from truth import solve
 from cradle.tables import paper_chain
 
 STRUCK = [1, 0, 0, 0, 0]
-#: The cells of the page that its two figures need; its fits of laws and swings take longer.
+#: The cells of the page that its figures need; its fits of laws and swings take longer.
 MEASURE = (
-    "setup", "phone", "track-call", "fig-tracks", "choose", "sets", "show-pairs", "show-ratios",
-    "fig-fit",
+    "setup", "fig-setup", "phone", "track-call", "fig-tracks", "choose", "sets", "show-pairs",
+    "show-ratios", "fig-fit",
 )  # fmt: skip
 
 
@@ -66,6 +66,26 @@ def test_fig_inventory_resting():
     np.testing.assert_allclose(before[:, 1], free, rtol=0, atol=1e-9)
     assert 40 * math.cos(short * first) == pytest.approx(39.2 * math.cos(long * first), abs=1e-9)
     assert (hits[:, 1] == 0).all()
+
+
+def test_fig_measure_setup():
+    """A drawing: equal threads, a dot on each ball, phone and ruler where the text puts them."""
+    front, side = drawn("measure", MEASURE)["fig-measure-setup"].axes
+    balls = np.array([shape.center for shape in front.patches if hasattr(shape, "center")])
+    dots = np.concatenate([x.get_xydata() for x in front.lines if x.get_marker() == "o"])
+    np.testing.assert_allclose(dots, balls)
+    _, *threads = (x.get_xydata() for x in front.lines if len(x.get_xydata()) == 2)
+    assert len(threads) == len(balls) == 5
+    for thread, ball in zip(threads, balls, strict=True):
+        np.testing.assert_allclose(thread[1], ball)
+        assert math.dist(*thread) == pytest.approx(4)
+    lifted, *waiting = balls
+    assert lifted[0] < -1
+    assert lifted[1] > 0
+    np.testing.assert_allclose(waiting, [[k, 0] for k in range(1, 5)], atol=1e-12)
+    ball, ruler, phone, *_ = side.patches
+    assert ruler.get_x() + ruler.get_width() / 2 == pytest.approx(ball.center[0])
+    assert phone.get_y() + phone.get_height() / 2 == pytest.approx(ball.center[1])
 
 
 def test_fig_measure_tracks():
