@@ -536,10 +536,10 @@ def test_a_film_of_two_lifted(folder, capsys):
     (folder / "two.txt").write_text(film, encoding="utf-8")
     line = "film two.txt --set ABCD --masses 1,1,1,1 --length 0.3"
     with pytest.raises(SystemExit):
-        run(shlex.split(f"{line} --striker 1 --striker 2"))
+        run(shlex.split(f"{line} --name '2 lifted' --striker 1 --striker 2 --header"))
     printed = capsys.readouterr()
-    rows = [row.split(",") for row in printed.out.splitlines()]
-    before, after = np.array([row[5:7] for row in rows], float).T
+    one = read_shots(io.StringIO(printed.out))["2 lifted"]
+    before, after = one.before[0], one.after[0]
     np.testing.assert_allclose(before, [0.7, 0.7, 0, 0], atol=2e-3)
     np.testing.assert_allclose(after, [0, 0, 0.7, 0.7], atol=2e-3)
     assert "two.txt: balls 1 and 2 strike at " in printed.err

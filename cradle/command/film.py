@@ -40,7 +40,8 @@ def _units(position_unit: str | None, scale: float | None, slower: float) -> dic
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=_FILE)
-@click.option("--set", "name", required=True, help="Types of the balls, left to right: BAC.")
+@click.option("--set", "letters", required=True, help="Types of the balls, left to right: BAC.")
+@click.option("--name", help="Name of the set, such as '2 lifted' [its letters].")
 @click.option("--shot", help="Name of the shot [that of the file].")
 @click.option("--masses", required=True, callback=numbers_of,
               help="Masses, left to right: 53,45,53.")  # fmt: skip
@@ -53,9 +54,9 @@ def _units(position_unit: str | None, scale: float | None, slower: float) -> dic
 @click.option("--window", type=float, help="Time used before and after, s [the longest that fits].")
 @click.option("--header", is_flag=True, help="Print the names of the columns too.")
 def film(
-    files: tuple[Path, ...], name: str, shot: str | None, masses: list[float], unit: str | None,
-    header: bool, length: float | None, period: float | None, level: bool, window: float | None,
-    striker: Sequence[int], **options: Any,
+    files: tuple[Path, ...], letters: str, name: str | None, shot: str | None, masses: list[float],
+    unit: str | None, header: bool, length: float | None, period: float | None, level: bool,
+    window: float | None, striker: Sequence[int], **options: Any,
 ) -> None:  # fmt: skip
     """Velocities from the marks in films, a film a shot.
 
@@ -80,7 +81,7 @@ def film(
         raise click.UsageError("--shot names one film; several have the names of their files")
     if (length is None) != level:
         raise click.UsageError("give --length or --period of the pendulums, or --level: one")
-    types = parameter_key(name)
+    types = parameter_key(letters)
     kilograms = checked_masses([UNITS[unit or "kg"] * mass for mass in masses]).tolist()
     writer, wrong = csv.writer(sys.stdout, lineterminator="\n"), []
     for file in files:
@@ -95,7 +96,9 @@ def film(
             header = False
         measured = one.before, one.after, one.sigma, one.sigma_before
         for k, (kind, *numbers) in enumerate(zip(types, kilograms, *measured, strict=True), 1):
-            writer.writerow([name, shot or file.stem, k, kind, *(f"{x:.6g}" for x in numbers)])
+            writer.writerow(
+                [name or letters, shot or file.stem, k, kind, *(f"{x:.6g}" for x in numbers)]
+            )
         who = " and ".join(str(k + 1) for k in one.before.nonzero()[0])
         who = f"balls {who} strike" if len(striker) > 1 else f"ball {who} strikes"
         when = f"{who} at {one.time:.4g} s, marks within {one.window:.3g} s"
