@@ -93,21 +93,17 @@ def story() -> list[dict[str, Any]]:
          "here 0.15. Move it: at 0 ball 3 leaves alone; at 0.5 balls 2 and 3 leave together, and "
          "ball 1 comes back faster."),
         ("one", "Pull back one ball", equal(5, 0.0), "inside",
-         "Now five balls. One strikes, and one leaves at the other end. This is the toy of the "
-         "textbooks: the balls collide one pair after the other. In the paper's terms, the ratio "
-         "is 0. "
-         "Steel balls that touch do not do this: "
-         "if contacts push by Hertz's law and lose no energy, balls 1 to 5 leave with "
-         f"{speeds(5)}."),
+         "Now five balls. One strikes, and one leaves at the other end, as the textbooks say: the "
+         "balls collide one pair after the other. This is the ratio 0. "
+         "Steel balls that touch do not do this."),
         ("two", "Pull back two balls", equal(5, 0.0, 2), "inside",
          "Two balls strike, and two leave. The ratio is still 0. Pull back three, and one of them "
          "never stops."),
         ("small", "A small ratio", equal(5, 0.15), "inside",
-         "Now each inner ball passes some of a push on while it is still being pushed. That share "
-         "is the ratio. The last ball still takes most of the motion, but the first one comes back "
-         "a little. Of these scenes this one is nearest to steel balls that touch. There balls 2 "
-         "and 3 come back, too. Here they rest: with one ratio for all inner balls they never "
-         "come back."),
+         "With 0.15 the last ball still takes most of the motion, but the first one comes back a "
+         "little. Of these scenes this one is nearest to steel balls that touch: if these push by "
+         f"Hertz's law and lose no energy, balls 1 to 5 leave with {speeds(5)}. With one ratio for "
+         "all inner balls, balls 2 and 3 never come back."),
         ("half", "The ratio one half", equal(5, 0.5), "sweep",
          "Half of each push goes on at once. The last two balls leave together, and the first one "
          "bounces back. Energy and momentum are the same as at the ratio 0."),
@@ -122,7 +118,8 @@ def story() -> list[dict[str, Any]]:
          "dozen collisions. Make it lighter still, and count them."),
         ("meeting", "Two runs that meet", meeting, "inside",
          "The first ball comes in at full speed, the second at half of it: Fig. 8 of the paper. "
-         "Two stretches of the row are in contact at once, until the gap between them closes too."),
+         "For a while balls 1 and 2 push each other, and so do balls 3 and 4; between them nothing "
+         "pushes, until balls 2 and 3 are equally fast."),
         ("map", "Who bounces back?", equal(3, 0.15, e=0.5), "map",
          "Which balls come back depends on two quotients of masses. Drag the point over the map, "
          "which is Fig. 6 of the paper."),

@@ -50,9 +50,8 @@
       // An answer of a few is known once it is told; speeds can be guessed again, on a page of its
       // own by a button.
       const again = answers || this.page ? "" : guessing;
-      const asks = answers !== undefined;
       // In a chapter the text beside it speaks of the first hit.
-      this.state = new State({ scene, picture, guessing, again, asks, first: !this.page });
+      this.state = new State({ scene, picture, guessing, again, first: !this.page });
       this.visible = true;
       this.pointed = false; // whether a pointer has chosen what has the focus
       this.box = this.box.bind(this);

@@ -94,8 +94,9 @@
       if (!list) return;
       list.node.inert = open;
       list.show(guess?.answer ?? null);
-      const right = open && guess?.answer && ANSWERS[answer]({ hit, record, now });
+      const right = open && guess && ANSWERS[answer]({ hit, record, now });
       if (!right) told.textContent = "";
+      else if (!guess.answer) told.textContent = `Answer: ${right}.`;
       else if (right === guess.answer) told.textContent = `Yes: ${right}.`;
       else told.textContent = `You said ${guess.answer}; it is ${right}.`;
     }

@@ -183,8 +183,9 @@
     const sliders = settingSliders(act, parts.has("half") ? 0.5 : 1); // the largest ratio
     const wanted = { count, scope, law, ...sliders };
     const has = (name) => parts.has({ forward: "ratio", backward: "ratio", gap: "law" }[name] ?? name);
-    for (const name of ["restitution", "ratio", "forward", "backward", "stiffness"])
-      sliders[name].node.classList.add("near"); // on a phone below the buttons
+    const { restitution, ratio, forward, backward, gap, stiffness } = sliders;
+    for (const { node } of [law, restitution, ratio, forward, backward, gap, stiffness])
+      node.classList.add("near"); // on a phone below the buttons
     const nodes = Object.keys(wanted)
       .filter(has)
       .map((name) => wanted[name].node);

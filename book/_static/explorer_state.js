@@ -7,8 +7,7 @@
   const INSIDE = 3.5; // seconds that a hit takes in slow motion
   const REST = 0.5; // seconds before the balls are let go again
   const LOOK = 1.2; // seconds that the balls wait after a hit that was guessed
-  const GUESS = "Guess, then press Let go. The answer appears at the hit.";
-  const CHOOSE = "Choose an answer first.";
+  const GUESS = "Guess, or just press Let go. The answer appears at the hit.";
 
   const { chapters, scenes } = explorer.data;
   const named = (key) => [...scenes, ...chapters].find((scene) => scene.key === key);
@@ -16,12 +15,11 @@
   class State {
     // `picture`: which one to show instead of that of a scene; `guessing`: whether the outcome is
     // covered until the reader has seen the balls move, this "once", "always", or not at all ("");
-    // `again`: what it is once the balls are pulled back; `asks`: whether a guess is one of some
-    // answers; `first`: whether the pictures stay at the first hit, while the balls swing on, until the
-    // reader asks for the next one.
-    constructor({ scene, picture, guessing = "", again = "", asks = false, first = false }) {
+    // `again`: what it is once the balls are pulled back; `first`: whether the pictures stay at the
+    // first hit, while the balls swing on, until the reader asks for the next one.
+    constructor({ scene, picture, guessing = "", again = "", first = false }) {
       this.picture = picture;
-      Object.assign(this, { guessing, again, asks, first });
+      Object.assign(this, { guessing, again, first });
       this.clock = { time: 0, playing: false, slow: false, inside: null, guessed: false, wait: 0 };
       this.view = {
         scene: "", // a key, or none for a setting of the reader's own
@@ -97,15 +95,7 @@
     }
 
     answer(answer) {
-      this.view.notice = "";
       this.view.guess.answer = answer;
-    }
-
-    // Return whether a hit may be seen; who has not answered yet is told to.
-    mayMove() {
-      const answered = !this.asks || !this.covered || Boolean(this.view.guess.answer);
-      if (!answered) this.view.notice = CHOOSE;
-      return answered;
     }
 
     cover() {
@@ -203,13 +193,11 @@
 
     play() {
       const { clock } = this;
-      if (!this.mayMove()) return;
       if (!this.first) this.follow();
       clock.playing = !clock.playing && this.swing.positions(clock.time) !== null;
     }
 
     step() {
-      if (!this.mayMove()) return;
       const { clock, view } = this;
       // The one after that which is shown.
       const number = (clock.guessed ? view.number : this.swing.latest(Math.max(clock.time, 0))) + 1;

@@ -171,6 +171,7 @@
     }
 
     host.replaceChildren(
+      piece ? make("p", { class: "turn" }, "Your turn: ", make("code", {}, piece)) : "",
       make("div", { class: "editor" }, count, editor),
       make("div", { class: "run" }, start, halt, told),
       wrong,
