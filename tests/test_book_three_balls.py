@@ -233,14 +233,15 @@ def test_energy_that_the_example_loses():
     assert sum(parts) == pytest.approx(lost, rel=1e-12)
     # The numbers that the text puts into the formulas: the right-hand sides.
     cells = [CHAPTER.cells[f"{x}-numbers"] for x in ["first", "second", "area", "outcome", "loss"]]
-    told = "".join(cell.outputs[0].data["text/latex"] for cell in cells)
+    *told, loss = (cell.outputs[0].data["text/latex"] for cell in cells)
+    told = "".join(told)
     ends = [float(x) for x in re.findall(r"=(-?[.\d]+)(?=\\text|\\\\)", told)]
     tau_2, tau_3 = trace.path_impulses.T  # g is the final tau_2
     right = [*tau_2[1:3], *tau_2[2:4], 0.5, tau_3[3], 0.7, tau_3[4], trace.velocities[0]]
     right += [trace.path[2, 1], *trace.velocities[1:]]
     right += [*trace.path_impulses.sum(axis=1)[[2, 4]]]  # events 1 and 2 in the opening figure
-    right += [*np.divide([*parts, lost], 1000)]
     assert ends == pytest.approx(right, abs=5.1e-4)
+    assert re.findall(r"[.\d]+", loss) == [f"{x / 1000:.4f}" for x in (*parts, lost)]
 
 
 def test_fig_4_curves():
@@ -262,6 +263,24 @@ def test_a_light_ball_in_the_middle_has_its_kink_where_only_ball_3_leaves():
     assert [sum(x.collisions) for x in found] == [3, 2, 2]
     np.testing.assert_allclose(floats(found[1].velocities), [0, 0, 1], atol=1e-14)
     assert found[0].velocities[1] > 0 < found[2].velocities[1]
+
+
+@pytest.mark.parametrize(("mass", "kinks"), [("0.6", 1), ("0.32", 2), ("0.2", 3), ("0.1", 5)])
+def test_each_kink_is_one_collision_more(mass, kinks):
+    """From the bound down, by the independent solver: first at 1-2, then at 2-3, in turn."""
+    ratios = np.linspace(1 / (1 + float(mass)), 0, 200)[1:]
+    found = [solve([1, mass, 1], [1, 0, 0], 1, ratio) for ratio in ratios]
+    steps = np.diff([x.collisions for x in found], axis=0)
+    more = np.flatnonzero(steps.any(axis=1))
+    assert found[0].collisions == [1, 1]
+    assert steps[more].tolist() == [[1, 0], [0, 1]] * (kinks // 2) + [[1, 0]] * (kinks % 2)
+    # There and nowhere else the slope of a curve changes far more than around it.
+    slopes = np.diff([floats(x.velocities) for x in found], axis=0)
+    jumps = np.abs(np.diff(slopes, axis=0)).max(axis=1)
+    around = [np.median(jumps[max(k - 6, 0) : k + 7]) for k in range(len(jumps))]
+    sharp = np.flatnonzero(jumps > 5 * np.array(around))
+    assert set(sharp) <= {*more, *(more - 1)}
+    assert all({k, k - 1} & set(sharp) for k in more)
 
 
 def test_one_outcome_belongs_to_many_parameters():

@@ -102,8 +102,9 @@ class Editor:
 
 @pytest.fixture
 def page(visit):
-    """Open the page, and keep what it asks for."""
+    """Open the page, and the fold with the whole program; keep what it asks for."""
     tab = visit(chapter="own_solver")
+    tab.locator(f".admonition:has({WHOLE}) .toggle-button").click()
     tab.asked = []
     tab.on("request", lambda request: tab.asked.append(request.url))
     return tab
