@@ -100,10 +100,9 @@ def story() -> list[dict[str, Any]]:
          "Two balls strike, and two leave. The ratio is still 0. Pull back three, and one of them "
          "never stops."),
         ("small", "A small ratio", equal(5, 0.15), "inside",
-         "With 0.15 the last ball takes most of the motion, and the first one comes back a little. "
-         "Of these scenes this one is nearest to steel balls that touch. By Hertz's law, without "
-         f"loss, these leave with {speeds(5)}. With one ratio for all, balls 2 and 3 never come "
-         "back."),
+         "With 0.15 the last ball takes most of the motion, and the first comes back a little. Of "
+         "all scenes this is nearest to steel balls that touch; by Hertz's law, without loss, they "
+         f"leave with {speeds(5)}. With one ratio for all, balls 2 and 3 never come back."),
         ("half", "The ratio one half", equal(5, 0.5), "sweep",
          "Half of each push goes on at once. The last two balls leave together, and the first one "
          "bounces back. Energy and momentum are the same as at the ratio 0."),
