@@ -30,7 +30,7 @@ def code(c, state):
 @apart
 def remember(number, c, n, state):
     """Take a snapshot of the contacts around c."""
-    # It is kept for 1, 1, 2, 1, 1, 2, 4, ... times the least distance: short cycles are found soon.
+    # It is kept for 1, 2, 1, 4, 1, 2, 1, 8, ... times the least distance: short cycles come first.
     level, contact, memory = state.level[number], state.contact, state.memory[number]
     level.mark = c
     level.taken += 1
@@ -127,14 +127,12 @@ def limit(cluster, number, state):
         stored = contact[c].q.real - factor * factor * memory[c].q.real
         off = max(off, abs(stored) / reduced_mass(c, ball) / size / size)
     # The steady neighbours' impulses go with those of the contacts beside them.
-    for c in range(left, first):
-        there = times(contact[first].x, minus(ONE, left_part))
-        there = over(there, since(first - 1, contact, memory))
-        contact[c].x = times(since(c, contact, memory), there)
-    for c in range(last + 1, right + 1):
-        there = times(contact[last].x, minus(ONE, right_part))
-        there = over(there, since(last + 1, contact, memory))
-        contact[c].x = times(since(c, contact, memory), there)
+    for c in range(left, right + 1):
+        if c < first or c > last:
+            edge, beside = (first, first - 1) if c < first else (last, last + 1)
+            there = times(contact[edge].x, minus(ONE, left_part if c < first else right_part))
+            there = over(there, since(beside, contact, memory))
+            contact[c].x = times(since(c, contact, memory), there)
     return total, off, size
 
 
@@ -292,14 +290,12 @@ def cycle(number, c, n, state):
 
 def look(number, c, n, state):
     """See whether contact c has come round; take a new snapshot if the last one is old."""
-    level = state.level[number]
+    level, first, last = state.level[number], c, c - 1
     if level.mark == c:
         first, last = cycle(number, c, n, state)
-        if first <= last:
-            return first, last
-    if level.count >= level.due:
+    if last < first and level.count >= level.due:
         remember(number, c, n, state)
-    return c, c - 1
+    return first, last
 
 
 @apart

@@ -41,10 +41,12 @@ def part_of(way, whole, made):
 
 def first_meeting(n, state):
     """R8.2, R8.4: of several gaps that must close the one first reached, as its left run, or -1."""
+    # No run goes yet: all parts are zero.
     run, contact, tally = state.run, state.contact, state.tally[0]
     best = before = -1
     first = run[n - 1].onward
     while first < n - 1:
+        run[first].part = ZERO
         if run[first].stirred == 1:
             segment(first, n, run, state.ball, contact, tally)
         if before >= 0 and first == run[before].last + 2:
@@ -83,29 +85,18 @@ def part_beyond(first, part, outward, c, n, state):
     return NEVER
 
 
-def who_goes(one, n, state):
-    """R8.4 to R8.6: say what part of its segment each run goes; return the gap to close, or -1."""
-    # Run `one` and the next meet; but if one of them reaches the gap at its far side on the way,
-    # this closes first, and only that run goes.  If `one` is -1, all go to their own next events.
-    ball, run = state.ball, state.run
-    first = run[n - 1].onward
-    while first < n - 1:
-        run[first].part = ONE if one < 0 else ZERO
-        run[first].stirred = 0
-        first = run[first].onward
-    if one < 0:
-        return -1
-    other, left, right = run[one].onward, run[one].left, run[one].right
-    gap, far, beyond = other - 1, one - 1, run[other].last + 1
-    sooner_left = part_beyond(one, left, negative(ball[one].pull), far, n, state)
-    sooner_right = part_beyond(other, right, ball[beyond].pull, beyond, n, state)
-    if sooner_left.real < math.inf or sooner_right.real < math.inf:
-        by_left = not less(sooner_right, sooner_left)
-        gap = far if by_left else beyond
-        left = sooner_left if by_left else ZERO
-        right = ZERO if by_left else sooner_right
-    run[one].part, run[other].part = left, right
-    return gap
+def gap_to_close(one, n, state):
+    """R8.4: the gap that closes first, and the parts that run `one` and the next go to it."""
+    # They meet; but one that reaches the gap at its far side on the way goes alone.
+    run, other, far = state.run, state.run[one].onward, one - 1
+    left, right, beyond = run[one].left, run[one].right, run[other].last + 1
+    by_left = part_beyond(one, left, negative(state.ball[one].pull), far, n, state)
+    by_right = part_beyond(other, right, state.ball[beyond].pull, beyond, n, state)
+    if less(by_right, by_left):
+        return beyond, ZERO, by_right
+    if by_left.real < math.inf:
+        return far, by_left, ZERO
+    return other - 1, left, right
 
 
 def book_work(k, impulse, now):
@@ -162,18 +153,22 @@ def advance(one, n, state):
             k.u = ZERO
         elif k.active == 0 and now.real > 0.0:
             tally.defect = PASSED
-    one.stirred = 1
 
 
 def go(n, state):
-    """R8.2 to R8.6: take every run on; close the gap at which two of them meet."""
+    """R8.2 to R8.6: take all runs to their next events, or the two that meet first to their gap."""
     run, contact, tally = state.run, state.contact, state.tally[0]
     tally.stamp += 1
-    gap = who_goes(first_meeting(n, state), n, state)
+    met, gap = first_meeting(n, state), -1
+    if met >= 0:
+        gap, run[met].part, run[run[met].onward].part = gap_to_close(met, n, state)
     first = run[n - 1].onward
     while first < n - 1:
         one = run[first]
-        if one.part.real > 0.0:
+        if met < 0:
+            one.part = ONE
+        one.stirred = 1 if one.part.real > 0.0 else 0
+        if one.stirred == 1:
             one.way = times(one.reach, one.part)
             if not one.way.real < math.inf:
                 tally.defect = NO_EVENT
