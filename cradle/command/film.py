@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 import cradle
 from cradle.command.console import format_options, plotted, save, show
@@ -115,8 +116,6 @@ def _velocities(
     length: float | None, window: float | None, striker: Sequence[int],
 ) -> tuple[str, Any]:  # fmt: skip
     """Return what was warned of, and the velocities in one film, of balls of these types."""
-    import numpy as np
-
     from cradle.fit import read_tracker, velocities_from_tracks
 
     tracks = read_tracker(file, **units)

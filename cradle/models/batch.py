@@ -189,14 +189,12 @@ def in_order(
 
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape."""
-    size, count = array.shape[-1], rows.stop - rows.start
+    size = array.shape[-1]
     if array.size == size:
-        part = array.reshape(1, size) if count == 1 else array.reshape(1, size).repeat(count, 0)
-    elif array.shape[:-1] == lead and array.flags.c_contiguous:
+        return np.full((rows.stop - rows.start, size), array.reshape(size))
+    if array.shape[:-1] == lead and array.flags.c_contiguous:
         part = array.reshape(-1, size)[rows]
-    else:
-        # Without making the others.
-        full = np.broadcast_to(array, (*lead, size))
-        return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
-    # Compiled code is made for arrays that may be written to; it writes to no input.
-    return part if part.flags.writeable and part.flags.c_contiguous else part.copy()
+        # Compiled code is made for arrays that may be written to; it writes to no input.
+        return part if part.flags.writeable else part.copy()
+    full = np.broadcast_to(array, (*lead, size))  # without making the others
+    return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]

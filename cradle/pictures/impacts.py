@@ -50,16 +50,6 @@ def _indexed(symbol: str, number: int) -> str:
     return f"${symbol}_{number}$" if number < 10 else f"${symbol}_{{{number}}}$"
 
 
-def _impulse(contact: int) -> str:
-    return "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
-
-
-def _contact(trace: Trace, name: str, contact: int) -> int:
-    """Return a contact that the impact has."""
-    last = len(must_be(Trace, "trace", trace).impulses) - 1
-    return whole_number(name, contact, f"0 to {last}", 0, last)
-
-
 def _lines(ax: Axes | None, over: str, x: Vector, path: Vector, balls: Sequence[int]) -> Axes:
     """Draw the velocities of some balls over an impulse, on new axes if there are none."""
     ax = plt.subplots(figsize=(5.6, 3.9), layout="constrained")[1] if ax is None else ax
@@ -110,9 +100,11 @@ def velocity_impulse(trace: Trace, contact: int, ax: Axes | None = None) -> Axes
     >>> [line.get_label() for line in ax.get_lines()[:2]]
     ['$v_2$', '$v_3$']
     """
-    contact = _contact(trace, "contact", contact)
+    last = len(must_be(Trace, "trace", trace).impulses) - 1
+    contact = whole_number("contact", contact, f"0 to {last}", 0, last)
     impulses, path = trace.curve()
-    ax = _lines(ax, _impulse(contact), impulses[:, contact], path, (contact, contact + 1))
+    over = "impulse " + _indexed(r"\tau", contact + 2) + " (N s)"
+    ax = _lines(ax, over, impulses[:, contact], path, (contact, contact + 1))
     _mark_events(trace, contact, ax)
     return ax
 

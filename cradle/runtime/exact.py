@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from cradle import textbook
+from cradle.kernel.numbers import read
 from cradle.kernel.state import LIMITS, Record
 
 _DIGITS, _ZERO, _SOUND = 400, Decimal("1e-240"), Decimal("1e-200")  # of speeds, and of sums
@@ -23,10 +24,8 @@ class Impact(textbook.Impact):
 
 
 def meant(x: float) -> Decimal:
-    """Return what a float means, as `kernel.numbers.read` does: what it prints as, or its bits."""
-    printed = Decimal(repr(x))
-    short = len(printed.normalize().as_tuple().digits) <= 15 and 1e-7 <= abs(x) < 1e14
-    return printed if short else Decimal(x)
+    """Return what a float means to `read`: its bits, or the decimal that it prints as."""
+    return Decimal(repr(x)) if read(x).imag else Decimal(x)
 
 
 def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:

@@ -109,9 +109,8 @@ class Hanging:
         if beyond.any():
             most = "half" if self.reach[0] > 2.0 * self.length[0] else "a quarter of"
             far = f"{self.reach[beyond.argmax()]:.4g} m: pendulums of this length reach"
-            asked.refuse_where(
-                f"{when}positions", x, beyond, f"must be within {far} {most} a circle"
-            )
+            rule = f"must be within {far} {most} a circle"
+            asked.refuse_where(f"{when}positions", x, beyond, rule)
 
     def apart(self, x: Vector) -> Vector:
         """Return the nearest places at which no balls overlap, m; their centre stays."""
