@@ -269,12 +269,10 @@ def cycle(number, c, n, state):
         return c, c - 1
     bent = 0.0
     if off > LIMITS.self_similar:
-        if total < 0.0:
-            return c, c - 1  # a cycle that grows does so by one factor
         # How often the scale still shrinks by L: log(1 / L) is about 1 / (T + 1/2).
         threshold = max(LIMITS.exhausted * state.tally[0].fastest, 5e-324)
         bent = off * max(math.log(size / threshold), 1.0) * (total + 0.5)
-        if not bent < LIMITS.bend:
+        if not 0.0 < bent < LIMITS.bend:  # a cycle that grows, T below -1, does so by one factor
             return c, c - 1
     if total > 0.0:
         if is_in_doubt(cluster, bent, state):

@@ -90,8 +90,7 @@ def admissible(n, chain, bounded):
     for i in range(n):
         if not (0.0 < m[i] < math.inf and m[i] >= LIMITS.lightest * heaviest):
             return False
-    for c in range(n - 1):
-        if not (e[c] == 0.0 or LIMITS.least_restitution <= e[c] <= 1.0):
+        if i < n - 1 and not (e[i] == 0.0 or LIMITS.least_restitution <= e[i] <= 1.0):
             return False
     for i in range(n - 2):
         if not (0.0 <= forward[i] <= 1.0 and 0.0 <= backward[i] <= 1.0):
