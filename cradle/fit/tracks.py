@@ -106,17 +106,9 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
 def frames(tracks: Mapping[str, Track]) -> tuple[Vector, Vector]:
     """Return the times of a film and the places of its balls, as `fit_swing` takes them.
 
-    Places of a ball are counted from their median, which is near where it hangs.
-
-    Parameters
-    ----------
-    tracks : mapping of str to Track
-        As `read_tracker` gives them, from left to right.
-
-    Returns
-    -------
-    times, positions : ndarray, shapes (K,) and (K, N)
-        In s; and in m, nan where a ball was not marked.
+    From tracks as `read_tracker` gives them, left to right, come the times, s, shape (K,), and the
+    positions, m, shape (K, N), nan where a ball was not marked.  Places of a ball are counted from
+    their median, which is near where it hangs.
 
     Examples
     --------
