@@ -204,8 +204,8 @@ class _Process:
             # For a large p a trial step far too long overflows, and is rejected.
             with np.errstate(over="ignore", invalid="ignore"):
                 found = solve_ivp(self.rate, (self.t, end), self.y, "DOP853", **options)
-            half = len(contacts)
-            turns = zip(contacts, found.t_events[half:], found.y_events[half:], strict=True)
+            times, half = found.t_events, len(contacts)
+            turns = zip(contacts, times[half:], found.y_events[half:], strict=True)
             missed = [
                 t for c, ts, ys in turns for t, y in zip(ts, ys, strict=True)
                 if side[c] * self.depths(y)[c] < 0.0
@@ -217,12 +217,8 @@ class _Process:
             raise _Stopped(found.message)
         self.steps.append(found.y)
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
-        crossed, turned = (
-            [c for c, ts in zip(contacts, part, strict=True) if len(ts)]
-            for part in (found.t_events[:half], found.t_events[half:])
-        )
-        self.turn(turned)
-        self.settle(crossed)
+        self.turn([c for k, c in enumerate(contacts) if len(times[half + k])])
+        self.settle([c for k, c in enumerate(contacts) if len(times[k])])
 
     def watched(self, c: int) -> tuple[Any, Any]:
         """Return SciPy's events of contact c: it opens or closes; and it turns."""
