@@ -279,8 +279,6 @@ class _Process:
         from scipy.optimize import isotonic_regression
 
         u = self.speeds(self.y)
-        if not (u > 0.0).any():
-            return
         self.y = self.y.copy()
         change, _, impulses = self.parts(self.y)
         # Nearest in kinetic energy among the velocities in order: groups that collide plastically.
