@@ -43,13 +43,8 @@ def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -
     if level == 0.0 or rate.real == 0.0:
         if abs(level) >= abs(c):
             return math.inf if level > 0.0 else 0.0
-        wait = math.acos(-level / abs(c)) - cmath.phase(c)
-        if not parting:
-            wait %= 2.0 * math.pi
-            # It meets now, and rounding says that it has just met.
-            if wait > 2.0 * math.pi - TIE:
-                wait = 0.0
-        return wait / rate.imag
+        # Below zero, it meets now, and rounding says that it has just met.
+        return max(math.acos(-level / abs(c)) - cmath.phase(c), 0.0) / rate.imag
 
     def value(time: float) -> float:
         return level + (c * cmath.exp(rate * time)).real
