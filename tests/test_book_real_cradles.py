@@ -54,13 +54,14 @@ MODELS = (
 
 def test_two_strikers_that_come_as_one():
     """Ratios and gaps send the last ball off too fast."""
-    touch = parameters("three ratios, e", "together", "both")
-    v = 100 * real_cradles.ratios(touch[:3], touch[3], 2, False)
+    v = 100 * real_cradles.ratios(RATIOS[:3], RATIOS[3], 2, False)
+    touch = parameters("three ratios, e", "together", "both")  # nor if fitted so
+    fitted_so = 100 * real_cradles.ratios(touch[:3], touch[3], 2, False)
     gaps = 100 * real_cradles.by_spheres([*GAPS, 0.0], 2)
     CHAPTER.tells({"together-five": v[4], "together-gap": gaps[4], "three-e": RATIOS[3]})
     last, error = (100 * x[-1] for x in first_strikes(4)[2])
     assert GLUED["leave-five"] == f"{last:.1f} ± {error:.1f}"
-    assert last + 4 * error < min(v[4], gaps[4])
+    assert last + 4 * error < min(v[4], gaps[4], fitted_so[4])
     # One by one, the second comes when it has made up its distance to ball 2.
     slower, apart = real_cradles.SLOWER, real_cradles.APART
     second, third, *_ = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
@@ -80,30 +81,38 @@ def test_two_strikers_that_come_as_one():
 def test_chi_square_ball_by_ball():
     """A pencil with the digits of the table gets the sums of the text; c makes the sum least."""
     lines = re.findall(r"(?m)^\d +(.*)$", CHAPTER.printed("chi-code").replace("−", "-"))
-    film, error, law, off, square = np.array([x.split() for x in lines], float).T
+    film, error, law, scaled, off, square = np.array([x.split() for x in lines], float).T
     seen, sigma = (100 * x for x in first_strikes(4)[1])
     assert film == pytest.approx(seen, abs=6e-3)
     assert error == pytest.approx(sigma, abs=6e-4)
-    by_pencil = (film - law) / error
-    assert off == pytest.approx(by_pencil, abs=0.01)
-    assert square == pytest.approx(by_pencil**2, rel=1e-3, abs=0.06)
-    assert float(GLUED["plain"]) == pytest.approx((by_pencil**2).sum(), abs=0.6)
-    c = minimize_scalar(
+    *_, factor, total = CHAPTER.printed("chi-code").splitlines()
+    _, one, its_error, c, its_off, cost = factor.split()
+    assert (one, its_error) == ("1", "0.01")
+    assert scaled == pytest.approx(float(c) * law, abs=0.011)
+    by_pencil = (film - scaled) / error
+    exact = real_cradles.misfits(MODELS[0], first_strikes(4), (1,))
+    assert off == pytest.approx(exact[:5], abs=0.006)
+    # Two numbers are rounded: the fast ball's to two digits, the others' to three.
+    assert off[:4] == pytest.approx(by_pencil[:4], abs=0.01)
+    assert off[4] == pytest.approx(by_pencil[4], abs=0.01 / error[4] + 0.005)
+    assert square == pytest.approx(exact[:5] ** 2, rel=1e-3, abs=0.06)
+    assert float(its_off) == pytest.approx((1 - float(c)) / 0.01, abs=0.006)
+    assert float(cost) == pytest.approx(((1 - float(c)) / 0.01) ** 2, abs=0.1)
+    assert float(total.split()[1]) == pytest.approx(square.sum() + float(cost), abs=0.16)
+    assert float(GLUED["sum"]) == pytest.approx((by_pencil**2).sum() + float(cost), abs=0.6)
+    best = minimize_scalar(
         lambda c: (((film - c * law) / error) ** 2).sum() + ((c - 1) / 0.01) ** 2, bounds=(0.8, 1.2)
     )
-    last = CHAPTER.printed("chi-code").splitlines()[-1]
-    assert float(last.split()[1]) == pytest.approx(square.sum(), abs=0.16)
-    scaled = ((film - c.x * law) / error) ** 2
-    assert float(GLUED["shift-left"]) == pytest.approx(scaled.sum(), abs=2)
-    assert float(GLUED["sum"]) == pytest.approx(c.fun, abs=2)
-    CHAPTER.tells({"shift": 100 * (1 - c.x), "factor": c.x}, off=0.02)
-    assert float(GLUED["shift-cost"]) == pytest.approx(((c.x - 1) / 0.01) ** 2, abs=0.6)
-    assert float(GLUED["shift-left"]) + float(GLUED["shift-cost"]) == float(GLUED["sum"])
-    film_, law_, sigma = (
-        float(GLUED[f"pencil-{x}"].replace("−", "-")) for x in ("film", "law", "error")
+    assert float(GLUED["sum"]) == pytest.approx(best.fun, abs=2)
+    CHAPTER.tells({"factor": best.x}, off=2e-4)
+    assert float(c) == pytest.approx(best.x, abs=2e-4)
+    film_, law_, scaled_, sigma = (
+        float(GLUED[f"pencil-{x}"].replace("−", "-")) for x in ("film", "law", "scaled", "error")
     )
-    assert float(GLUED["pencil-difference"]) == pytest.approx(film_ - law_, abs=1e-9)
-    assert float(GLUED["pencil-off"]) == pytest.approx((film_ - law_) / sigma, abs=0.06)
+    assert law_ == law[0]
+    assert scaled_ == scaled[0]
+    assert float(GLUED["pencil-difference"]) == pytest.approx(film_ - scaled_, abs=1e-9)
+    assert float(GLUED["pencil-off"]) == pytest.approx((film_ - scaled_) / sigma, abs=0.01)
     assert float(GLUED["pencil-square"]) == round(float(GLUED["pencil-off"]) ** 2)
 
 
@@ -347,7 +356,16 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     assert reach["apart"] is None
     unit, verdicts = 1e3 * UNIT, []  # mm
     far = [row for row in rows if unit * row["apart"] > 0.095]
-    assert min(rows, key=lambda row: row["both"]) not in far
+    best = min(rows, key=lambda row: row["both"])  # misses the test
+    assert best not in far
+    CHAPTER.tells({"best-mm": unit * best["apart"], "best-both": best["both"]})
+    CHAPTER.tells({"best-three": best["three"]})
+    own = FITS["spheres, four gaps, A", "own gap", "both", "4"]  # its test has this distance, too
+    assert chi_square(own) == pytest.approx(best["both"], abs=0.01)
+    assert float(own["parameters"].split()[-1]) == pytest.approx(best["apart"], rel=0.01)
+    CHAPTER.tells({"best-own": float(own["chi_three"])})
+    assert max(gammaincc(2, x / 2) for x in (best["three"], float(own["chi_three"]))) < 1e-6
+    assert gammaincc(1.5, best["both"] / 2) > 0.05
     for k, shown in zip((2, 3, 4), GLUED["far-gaps"].split(", "), strict=True):
         of_all = [1e3 * unit * row[f"gap_{k}"] for row in far]
         assert shown.endswith(f" µm for gap {k}‑{k + 1}")
@@ -375,7 +393,7 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         assert worse == {words == "miss the test"}
         verdicts.append(words)
     assert verdicts == ["miss the test", "pass", "doubtful", "pass", "doubtful"]
-    # Doubtful: no velocity is far off, but at least five are off by one to two reading errors.
+    # Doubtful: the rest fits less well. At least five velocities are one to two reading errors off.
     for distance in (0.2, 0.3, 0.39, 1.2, 3.0):  # mm
         row = min(rows, key=lambda row: abs(unit * row["apart"] - distance))
         between, _, _, *p = row.values()
@@ -392,20 +410,18 @@ def test_the_jump_where_the_fit_changes_over_between_two_sets_of_gaps():
     """Each set, sought by the fitting script on both sides, and tested by another integrator."""
     *rows, _ = numbers("film_distances.csv")
     at = next(k for k, row in enumerate(rows) if 1e3 * UNIT * row["apart"] > 0.095)
-    sides, data = {"near": rows[at - 1], "far": rows[at]}, first_strikes(4)
+    sides, data, fits = {"near": rows[at - 1], "far": rows[at]}, first_strikes(4), {}
     for home, name in (("near", "wide"), ("far", "narrow")):
         _, _, _, *start = sides[home].values()
         for side, row in sides.items():
-            CHAPTER.tells({f"jump-{side}": 1e3 * UNIT * row["apart"]})
             fit, p = real_cradles.best_at(row["apart"], data, [start])
-            CHAPTER.tells({f"jump-{side}-{name}": fit}, off=0.02)
+            fits[side, name] = fit
             CHAPTER.tells({f"jump-{name}": 1e6 * UNIT * p[2]}, off=0.03)
             v = real_cradles.by_spheres(np.abs(p), 3, True)
             test = (real_cradles.misfits(lambda _, v=v: v, {3: data[3]}, (3,)) ** 2).sum()
             assert (gammaincc(2, test / 2) > 0.05) == (name == "narrow")
-    told = {k: float(x) for k, x in GLUED.items() if re.fullmatch("jump-(near|far)-.*", k)}
-    assert told["jump-near-wide"] < told["jump-near-narrow"]
-    assert told["jump-far-narrow"] < told["jump-far-wide"]
+    assert fits["near", "wide"] < fits["near", "narrow"]
+    assert fits["far", "narrow"] < fits["far", "wide"]
     wanted, error = float(GLUED["gap-wanted"]), float(GLUED["gap-wanted-error"])
     assert abs(float(GLUED["jump-narrow"]) - wanted) < error
     assert float(GLUED["jump-wide"]) - wanted > 5 * error
@@ -554,22 +570,19 @@ def test_gaps_and_not_ratios_predict_the_third_release():
     assert shown == pytest.approx(film, abs=6e-3)
     pairs = cache(lambda release: real_cradles.ratios(
         [0] * 3, *parameters("pairs, e", "apart", "both"), release, True))  # fmt: skip
-    *_, plain, shifted = CHAPTER.printed("third-code").splitlines()
+    *_, factor, sums = CHAPTER.printed("third-code").splitlines()
     for k, (law, model) in enumerate(zip(laws, (*MODELS, pairs), strict=True)):
-        by_pencil, off = (
-            ((law - shown) / sigma) ** 2,
-            real_cradles.misfits(model, first_strikes(4), (3,)),
-        )
-        total = by_pencil.sum()
-        assert abs(float(plain.split()[1 + k]) - total) < (0.06 if total < 100 else 0.51)
-        assert float(shifted.split()[1 + k]) == pytest.approx(off @ off, rel=0.01)
+        c, told = (float(line.split()[1 + k]) for line in (factor, sums))
+        by_pencil = (((c * law - shown) / sigma) ** 2).sum() + ((1 - c) / 0.01) ** 2
+        assert told == pytest.approx(by_pencil, rel=5e-3, abs=0.06)
+        off = real_cradles.misfits(model, first_strikes(4), (3,))
+        assert told == pytest.approx(off @ off, rel=0.01)
         assert law == pytest.approx(100 * model(3), abs=6e-3)
     assert (np.abs(gaps - film)[:2] < 0.5 * error[:2]).all()
-    shifted = real_cradles.misfits(MODELS[2], first_strikes(4), (3,))
-    CHAPTER.tells(
-        {"gap-three": (np.abs(gaps - film) / error)[2], "gap-three-shifted": abs(shifted[2])},
-        off=0.02,
-    )
+    off = np.abs(real_cradles.misfits(MODELS[2], first_strikes(4), (3,))[:5])
+    assert max(off[:2]) < 0.5
+    CHAPTER.tells({"gap-three": max(off)}, off=0.02)
+    assert off.argmax() == 2
     assert (np.abs(ratios - film)[:2] > 5 * error[:2]).all()
     CHAPTER.tells({"slow-off": np.abs(ratios - film)[:2].max(), "slow-error": error[:2].max()})
     assert f"{np.abs(ratios - film)[:2].min():.1f}" == GLUED["slow-off"]  # both
@@ -710,7 +723,7 @@ def test_what_the_third_strike_wants_of_ball_4():
         assert float(GLUED[f"{name}-wanted-error"]) == pytest.approx(error, abs=step)
     CHAPTER.tells({"fall": 100 * (1 - wanted["ratio"] / ratios[2])}, off=0.05)
     half = float(GLUED["fall-overlap"]) / float(GLUED["fall"])
-    assert half == pytest.approx(0.5, abs=0.1)  # twice as much
+    assert half == pytest.approx(0.5, abs=0.1)  # not as much
     # Either fits then; the gap did before.
     assert max(least.values()) < 6
     assert sums_of("gaps") - least["gap"] < 1
