@@ -128,17 +128,20 @@ def test_prediction_of_a_longer_row():
 
 def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():
     """Three sets that fit at 0.7 m/s, by SciPy's integration: alike there, apart at 0.35."""
-    told = re.findall(r"behind_\d = ([\d.]+)", CHAPTER.printed("gaps-law"))
-    off = np.abs(floats(told) - [3, 1.5, 0.5]).max()
-    assert off == pytest.approx(float(GLUED["gap-error"]), abs=0.0051)
+    lines = re.findall(r"gap_\d\d = ([\d.]+) \[([\d.]+), ([\d.]+)\]", CHAPTER.printed("gaps-law"))
+    told, low, high = np.array(lines, float).T
+    assert len(told) == 3
+    assert ((low < [3, 1.5, 0.5]) & (high > [3, 1.5, 0.5])).all()
+    assert (high - low).max() / 2 == pytest.approx(float(GLUED["gap-error"]), abs=0.0101)
+    assert np.abs(told - [3, 1.5, 0.5]).max() < float(GLUED["gap-error"])
     stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
 
-    def strike(gaps, speed, loss=3e-8):
+    def strike(gaps, speed, loss=2e-7):
         unit = (0.0448 * speed**2 / stiffness) ** 0.4
         gaps = [0.0, *(1e-6 * np.array(gaps) / unit)]
         return real_cradles.spheres(np.eye(5)[0], gaps, loss * speed / unit)
 
-    sets = [3.672, 1.339, 0.488], [3.673, 1.696, 0.378], [3.037, 1.442, 0.484]
+    sets = [3.715, 1.374, 0.504], [3.719, 1.669, 0.410], [3.000, 1.500, 0.500]
     same, slower = (np.array([strike(one, speed) for one in sets]) for speed in (0.7, 0.35))
     assert np.ptp(same, axis=0).max() < 5e-4  # numbers of two digits
     apart = np.abs(slower[:, None] - slower).max(axis=-1)[np.triu_indices(len(sets), 1)]
@@ -159,15 +162,15 @@ def test_the_left_out_set_by_another_integration():
     speeds = [0.35, 0.35, 0.7, 0.7, 1.4, 1.4]
     sigma = np.full((6, 5), float(GLUED["error-240"]) / 1000)
     noise = sigma * ndtri(np.random.default_rng(3).random(sigma.shape))
-    film = noise + [struck(600, 0.5, 30, speed) for speed in speeds]
-    numbers = [float(x) for x in re.findall(r"(?:apart|_4|viscosity) = ([\d.]+)", found)]
+    film = noise + [struck(600, 0.5, 200, speed) for speed in speeds]
+    numbers = [float(x) for x in re.findall(r"(?:apart|gap_45|viscosity) = ([\d.]+)", found)]
     judged = {
         law: (*map(int, sums), verdict)
         for law, *sums, verdict in re.findall(
             r"(?m)^ *(\S.*?) +(\d+) / (\d+) +(\d+) / (\d+) +(yes|no)$", found
         )
     }
-    for law, three in (("gaps", numbers[:3]), ("touching spheres", [900, 0, 0])):
+    for law, three in (("gaps", numbers[:3]), ("touching spheres", [900, 0, 180])):
         *_, told, free, _ = judged[law]
         off = (film - [struck(*three, speed) for speed in speeds]) / sigma
         # Of touching spheres the page prints no numbers: none is near enough.
@@ -180,7 +183,7 @@ def test_the_left_out_set_by_another_integration():
         passes = gammaincc(n / 2, fit / 2) > 0.05 and gammaincc(free / 2, test / 2) > 0.05
         assert (verdict == "yes") == passes == (law == "gaps")
     # Ratios see of the same film balls 3, 4 and 5 only; then balls 2 and 1 follow, pair by pair.
-    lossy, tried = 0.9978, np.linspace(0.05, 0.25, 81)
+    lossy, tried = 0.985, np.linspace(0.05, 0.25, 81)
 
     def by_ratio(ratio, speed):
         v = np.array([speed] * 3 + [0.0] * 2)
@@ -211,7 +214,7 @@ def test_the_left_out_set_by_another_integration():
         assert 0.97 * ends.min() < told < 1.03 * ends.max(), law
     # Two balls with this loss alone.
     unit = (0.0448 * 0.7**2 / stiffness) ** 0.4
-    first, second = real_cradles.spheres([1.0, 0.0], [0.0], 3e-8 * 0.7 / unit)
+    first, second = real_cradles.spheres([1.0, 0.0], [0.0], 2e-7 * 0.7 / unit)
     CHAPTER.tells({"viscous-e": second - first})
 
 
