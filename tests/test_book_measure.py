@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import real_cradles
 from chapters import BOOK, Chapter, floats
-from commands import call
+from commands import call, film_of_lifted
 from scipy.special import gammaincc, ndtri
 from scipy.stats import norm
 from stored import DATA, read
 from truth import solve
 
 from cradle.closed_form import one_collision_each, three_balls
+from cradle.fit import read_shots
 
 CHAPTER, TABLE = Chapter("measure"), Chapter("table_2")
 GLUED = CHAPTER.glued | TABLE.glued
@@ -232,19 +233,20 @@ def test_at_ratios_below_that_of_bac_the_first_two_balls_collide_twice():
 
 
 def test_the_commands_of_the_page_run_one_after_the_other(tmp_path, monkeypatch):
-    """Two films begin a table, to which the shots of the page are added; then all is fitted."""
+    """Films make tables; to the second the shots of the page are added, and all is fitted."""
     blocks = re.findall(r"(?s)```text\n(.*?)```", CHAPTER.cells["commands"].source)
     lines = "".join(blocks).splitlines()
     monkeypatch.chdir(tmp_path)
     film = (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
-    for name in ("one.txt", "two.txt"):
-        (tmp_path / name).write_text(film, encoding="utf-8")
+    (tmp_path / "bac.txt").write_text(film, encoding="utf-8")
+    for lifted, name in enumerate(("one.txt", "two.txt", "three.txt"), 1):
+        (tmp_path / name).write_text(film_of_lifted(5, lifted), encoding="utf-8")
     told = {}
     for line in lines:
         command, _, target = re.fullmatch(r"cradle (.*?)(?: (>>?) (\S+))?", line).groups()
         if command.startswith("fit-swing"):
             continue  # a film of a swing is fitted elsewhere
-        if "all.csv" in command:
+        if "fit all.csv" in command:
             _, *more = (DATA / "shots_synthetic.csv").read_text(encoding="utf-8").split("\n", 2)
             with (tmp_path / "all.csv").open("a", encoding="utf-8") as file:
                 file.write(more[1])
@@ -254,7 +256,12 @@ def test_the_commands_of_the_page_run_one_after_the_other(tmp_path, monkeypatch)
                 file.write(told[line])
     table = (tmp_path / "all.csv").read_text(encoding="utf-8").splitlines()
     assert table[0] == "set,shot,ball,type,mass,before,after,sigma,sigma_before"
-    assert [line[:7] for line in table[1:5]] == ["BAC,one"] * 3 + ["BAC,two"]
+    assert [line[:7] for line in table[1:4]] == ["BAC,bac"] * 3
+    row = read_shots(tmp_path / "my_row.csv")
+    for lifted in (1, 2, 3):
+        one = row[f"{lifted} lifted"]
+        assert (one.before[0] > 0.6).tolist() == [k < lifted for k in range(5)]
+        assert (one.after[0] > 0.6).tolist() == [k >= 5 - lifted for k in range(5)]
     (last,) = (words for line, words in told.items() if "all.csv" in line and " fit " in line)
     assert "ABACA" in last
     assert (tmp_path / "fit.png").is_file()

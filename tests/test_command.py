@@ -15,12 +15,11 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
-import fit_example
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from commands import call, examples
+from commands import call, examples, film_of_lifted
 from shots import columns, outcome
 from tqdm import tqdm
 
@@ -527,13 +526,7 @@ def test_a_pendulum_does_not_swing_over_the_top(capsys):
 
 def test_a_film_of_two_lifted(folder, capsys):
     """As by pairs, the last two leave."""
-    times = (np.arange(81) - 40.3) / 240
-    way = np.array([fit_example.swing(0.7, times) * some for some in (times < 0, times > 0)])
-    places = way[[0, 0, 1, 1]] + 0.022 * np.arange(4)[:, None]
-    places += np.random.default_rng(1).normal(0, 1e-4, places.shape)
-    lines = ["\t".join(f"{x:.7f}" for x in row) for row in np.column_stack([times, *places])]
-    film = "\n".join(["t\tA/x\tB/x\tC/x\tD/x", *lines])
-    (folder / "two.txt").write_text(film, encoding="utf-8")
+    (folder / "two.txt").write_text(film_of_lifted(4, 2), encoding="utf-8")
     line = "film two.txt --set ABCD --masses 1,1,1,1 --length 0.3"
     with pytest.raises(SystemExit):
         run(shlex.split(f"{line} --name '2 lifted' --striker 1 --striker 2 --header"))
