@@ -172,6 +172,8 @@ def test_pairs_take_the_place_of_the_row(program, root, capsys):
     page = json.loads((root / "book" / "recipe.ipynb").read_text("utf-8"))
     text = "".join("".join(cell["source"]) for cell in page["cells"])
     (lines,) = re.findall(r"```python\n(bodies = hang.*?)```", text, flags=re.DOTALL)
+    gap, told = re.search(r"gap=(\S+)\)  # \S+ of a diameter: (\d+) µm", lines).groups()
+    assert 2e6 * program.RADIUS * float(gap) == pytest.approx(float(told))
     tree = ast.parse((EXAMPLES / f"{program.__name__}.py").read_text("utf-8"))
     kept = [
         part

@@ -124,6 +124,19 @@ def test_balls_that_fly_to_and_fro_between_others_are_struck_one_by_one():
         assert off < 0.08
 
 
+def test_three_strikers_have_gaps_at_the_first_stroke_only():
+    """A law with gaps between the three that are lifted: on the way back they have none."""
+    bodies = Hanging([-math.radians(30)] * 3 + [0.0] * 2)
+    row = hung(bodies, model=SpringChain(1e10, gaps=[4e-4, 4e-4, 0, 0]))
+    ends = []
+    for _ in range(2):
+        steps(row, 1000, 1e-3)  # to the turning point
+        ends.append(np.sqrt(bodies.energy() / (GRAVITY * (1 - math.cos(math.radians(30))))))
+    np.testing.assert_allclose(ends[0][2:], 1, atol=0.01)
+    assert ends[1][0] > 1.07
+    assert ends[1][2] < 0.93
+
+
 SHORT = 0.2
 FIVE, MIXED, LIGHT = [1.0] * 5, [0.5, 1.0, 2.0], [1.0, 0.2, 1.0]
 
