@@ -82,7 +82,7 @@ def test_what_the_readme_says_of_a_filmed_cradle(root: Path):
     after = 100 * abs((film.after.to_numpy() - row) / (1 - row))
     assert [round(v) for v in after[:2]] == [int(v) for v in told.groups()[:2]]
     assert after[2:].max() < int(told[3]) < after[2:].max() + 1
-    assert "a gap of a tenth of the compression" in readme
+    assert "a gap of a tenth of the depth" in readme
     deep, story = (5 * 0.5 / 4) ** 0.4, np.eye(5)[4]
     still, gap = (cradle.spring_velocities([1] * 5, np.eye(5)[0], gaps=g) for g in (0, deep / 10))
     assert np.mean((gap - still) / (story - still)) == pytest.approx(0.5, abs=0.1)
