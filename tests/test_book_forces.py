@@ -77,6 +77,10 @@ def test_fig_cost():
         rows = list(read("forces.csv", chain="5 equal", method=method))
         found = [[float(row[name]) for name in ("microseconds", "error")] for row in rows]
         assert shown == pytest.approx(np.array(found))
+        if method == "this package":  # errs about ten times less than asked
+            asked = [float(row["asked"]) for row in rows]
+            assert asked == [1e-2, 1e-3, 1e-4, 1e-6]
+            assert all(7 < bound / off < 16 for bound, (_, off) in zip(asked, found, strict=True))
         told = {
             "velocity Verlet": ("batch-verlet", "batch-verlet-four"),
             "this package": ("batch", "batch-four"),
