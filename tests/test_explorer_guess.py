@@ -86,7 +86,7 @@ def test_scene_by_scene_is_guessed(still, name, before):
         tab.act("step()")
         tab.drawn()
         assert button.is_visible()
-        assert "Move the ratio to 0" in tab.inner_text(".next")
+        assert "Why not here? Balls 2 and 3 touch." in tab.inner_text(".next")
         assert tab.get_by_label("ratio", exact=True).is_visible()
     tab.push(name)
     tab.wait_for_function("document.querySelector('.run [aria-pressed=true]')")
