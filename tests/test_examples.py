@@ -155,7 +155,7 @@ def test_hanging_balls_are_looked_at_every_hundredth_of_a_second(program):
     closed(bodies)
 
 
-def test_the_program_runs_as_it_stands(program, capsys):
+def test_the_program_runs_as_it_stands(program, root, capsys):
     runpy.run_path(str(EXAMPLES / f"{program.__name__}.py"), run_name="__main__")
     table = np.array([line.split() for line in capsys.readouterr().out.splitlines()[-11:]], float)
     assert table.shape == (11, 5)
@@ -164,6 +164,12 @@ def test_the_program_runs_as_it_stands(program, capsys):
     assert table[2, 4] > 0.45
     assert np.abs(table[2, :4]).max() < 0.06
     assert np.abs(table).max() < 0.505
+    if program.__name__ == "pymunk_cradle":  # the page has its first lines
+        page = json.loads((root / "book" / "recipe.ipynb").read_text("utf-8"))
+        text = "".join("".join(cell["source"]) for cell in page["cells"])
+        (lines,) = re.findall(r"```text\n(.*?)```", text, flags=re.DOTALL)
+        told = np.array([line.split() for line in lines.splitlines()], float)
+        np.testing.assert_allclose(table[: len(told)], told, atol=2e-3)
 
 
 @pytest.mark.parametrize("program", ["pymunk_cradle", "box2d_cradle"], indirect=True)
