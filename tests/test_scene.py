@@ -293,7 +293,7 @@ def test_energy_left():
             assert glued[f"default-{engine.lower()}"] == f"{100 * left:.0f}"
     for name, pulled in (("fifth", 1), ("fifths", 2)):
         left = by_law("Box2D", "as it is", "fine", pulled)[-1].sum()
-        assert glued[name] == f"{left:.2f}"
+        assert glued[name] == f"{100 * left:.0f}"
         assert left == pytest.approx(pulled / 5, abs=0.01)
     pairs = [
         100 * with_tiny_gaps(name, "fine", pulled)[1][-1]
@@ -332,6 +332,7 @@ def test_each_aim_has_its_line():
     np.testing.assert_array_equal(said[toy, :2], said[:, :2].min(axis=0))
     np.testing.assert_array_equal(said[ideal, 2:4], said[:, 2:4].min(axis=0))
     assert (said[pairs, :4] < said[5, :4]).all()  # better than the best engine as it is
+    assert [k for k, line in enumerate(said[:3]) if line[3] <= said[ideal, 3]] == [ideal]
     for line in said[:3]:  # "the right balls in every engine", one lifted; "nearly all is left"
         assert line[2] < 10 < said[5, 2]
         assert line[4] >= 95
@@ -344,7 +345,6 @@ def test_depths_of_the_program():
     depth = 1e6 * (impact.forces.max() / 1e10) ** (2 / 3)
     for name in ("scene", "recipe"):
         Chapter(name).tells({"depth": depth}, off=0.05)
-    assert Chapter("scene").glued["toy-half"] == Chapter("trade").glued["toy-half"]
 
 
 def test_the_judge_of_outer_balls_apart():
@@ -515,7 +515,7 @@ def test_the_recipe_tells_where_the_energy_is():
         assert chapter.glued[f"off-own-{n}"].replace(" to ", "–") == scene[f"film-own-{n}"]
     three = integrated([1] * 5, [1, 1, 1, 0, 0], gaps=[3, 3, 0, 0])
     off = 100 * np.abs(np.abs(three) - np.abs(first_strikes(4)[3][0])).max()
-    assert chapter.glued["off-three-apart"] == scene["single-three"] == f"{off:.0f}"
+    assert chapter.glued["off-three-apart"] == f"{off:.0f}"
     back = integrated([1] * 5, [1, 1, 1, 0, 0], gaps=[0, 0, 3, 3])
     assert chapter.glued["three-back"] == f"{100 * back[-1]:.0f}"
     assert chapter.glued["last"] == f"{100 * first_strikes(4)[1][0][-1]:.0f}"
@@ -564,7 +564,7 @@ def test_the_figures_draw_the_tables():
     figures = Chapter("scene").figures
     (ax,) = figures["fig-scene-energy"].axes
     found = []
-    for law in ("springs, outer apart", "as it is"):
+    for law in ("springs", "as it is"):
         for name in ENGINES:
             rows = stored("laws", run=name, law=law, setting="fine", pulled=1)
             found.append(np.array([balls(row) for row in rows]))
@@ -627,8 +627,7 @@ def test_who_arrives_together_by_the_film():
     pair = {}
     for name, gaps, back in (
         ("film-springs-2", [0] * 4, 2), ("single", [30, 0, 0, 0], 2), ("near", [FAR, 0, 0, FAR], 2),
-        ("without", [FAR, 0, 0, 0], 2), ("apart-three", [FAR, 0, 0, FAR], 3),
-        ("touch-three", [0] * 4, 3), ("single-three", [FAR, FAR, 0, 0], 3),
+        ("without", [FAR, 0, 0, 0], 2),
     ):  # fmt: skip
         v = integrated([1] * 5, [1.0] * back + [0.0] * (5 - back), gaps=gaps)
         pair[name] = v[1:3]
