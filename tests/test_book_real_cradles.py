@@ -574,7 +574,7 @@ def test_gaps_and_not_ratios_predict_the_third_release():
     for k, (law, model) in enumerate(zip(laws, (*MODELS, pairs), strict=True)):
         c, told = (float(line.split()[1 + k]) for line in (factor, sums))
         by_pencil = (((c * law - shown) / sigma) ** 2).sum() + ((1 - c) / 0.01) ** 2
-        assert told == pytest.approx(by_pencil, rel=5e-3, abs=0.06)
+        assert abs(told - by_pencil) < (0.06 if told < 100 else 0.51)
         off = real_cradles.misfits(model, first_strikes(4), (3,))
         assert told == pytest.approx(off @ off, rel=0.01)
         assert law == pytest.approx(100 * model(3), abs=6e-3)

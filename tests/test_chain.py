@@ -77,7 +77,7 @@ def test_unusual_values_that_are_good_are_kept(name):
         ({"restitution": [1, 1.5]}, "restitution[1] = 1.5; must lie in [0, 1]"),
     ],
 )
-@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions("right")])
+@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions()])
 def test_a_chain_that_was_not_asked_is_refused_where_it_is_solved(part, words, model):
     """The event loop asks, too, and its words are those of `Chain`."""
     values = {name: np.array(value, float) for name, value in (GOOD | part).items()}

@@ -83,6 +83,14 @@ def test_what_touches_at_rest_and_is_not_pushed_does_not_act():
     assert trace.velocities[:2].tolist() == [0, 0]
 
 
+@pytest.mark.parametrize("velocities", [[-1, 0, 1e-17], [-1e5, 0, 1e-12]])
+def test_balls_in_order_get_nothing(velocities):
+    """Also where the sum of what lies between them shows no difference."""
+    trace = collide(Chain([1, 1, 1], velocities), EnergyDistribution())
+    assert trace.velocities.tolist() == velocities
+    assert not trace.impulses.any()
+
+
 def test_endless_plastic_impacts_end_in_one_body():
     trace = collide(striking([1, 1, 1], 0), EnergyDistribution(1.0))
     assert trace.collapsed

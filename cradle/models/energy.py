@@ -284,6 +284,8 @@ class _Process:
         # Nearest in kinetic energy among the velocities in order: groups that collide plastically.
         groups = isotonic_regression(-np.cumsum([0.0, *u]), weights=self.m).blocks
         for first, last in pairwise(groups.tolist()):
+            if not (u[first : last - 1] > 0.0).any():
+                continue  # in order, and apart by less than the sum resolves
             # From the heaviest ball of the group: of a larger sum its mass would show the rounding.
             m, lag = self.m[first:last], -np.cumsum([0.0, *u[first : last - 1]])
             lag -= lag[np.argmax(m)]
