@@ -529,7 +529,7 @@ def test_a_film_of_two_lifted(folder, capsys):
     (folder / "two.txt").write_text(film_of_lifted(4, 2), encoding="utf-8")
     line = "film two.txt --set ABCD --masses 1,1,1,1 --length 0.3"
     with pytest.raises(SystemExit):
-        run(shlex.split(f"{line} --name '2 lifted' --striker 1 --striker 2 --header"))
+        run(shlex.split(f"{line} --name '2 lifted' --striker 2 --striker 1 --striker 2 --header"))
     printed = capsys.readouterr()
     one = read_shots(io.StringIO(printed.out))["2 lifted"]
     before, after = one.before[0], one.after[0]

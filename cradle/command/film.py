@@ -100,8 +100,8 @@ def film(
             writer.writerow(
                 [name or letters, shot or file.stem, k, kind, *(f"{x:.6g}" for x in numbers)]
             )
-        who = " and ".join(str(k + 1) for k in one.before.nonzero()[0])
-        who = f"balls {who} strike" if len(striker) > 1 else f"ball {who} strikes"
+        lifted = [str(k + 1) for k in one.before.nonzero()[0]]
+        who = f"balls {' and '.join(lifted)} strike" if lifted[1:] else f"ball {lifted[0]} strikes"
         when = f"{who} at {one.time:.4g} s, marks within {one.window:.3g} s"
         how = f"marks scatter by {one.scatter:.2g} m; chance of such a fit {one.probability:.2g}"
         click.echo(f"{file.name}: {when}, {how}{told}", err=True)
@@ -130,10 +130,12 @@ def _velocities(
     if length is None and fastest > 20.0:  # a pendulum's length tells by itself
         raise ValueError(f"{fastest:.3g} m/s is unlikely; say the unit of the positions")
     n = len(tracks)
-    movers = [whole_number("--striker", k, f"from 1 to {n}", 1, n) - 1 for k in striker] or None
+    movers = {whole_number("--striker", k, f"from 1 to {n}", 1, n) - 1 for k in striker}
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        found = velocities_from_tracks(tracks, length=length, window=window, striker=movers)
+        found = velocities_from_tracks(
+            tracks, length=length, window=window, striker=sorted(movers) or None
+        )
     return "".join(f"; {one.message}" for one in told), found
 
 
