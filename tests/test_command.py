@@ -536,9 +536,13 @@ def test_a_film_of_two_lifted(folder, capsys):
     np.testing.assert_allclose(before, [0.7, 0.7, 0, 0], atol=2e-3)
     np.testing.assert_allclose(after, [0, 0, 0.7, 0.7], atol=2e-3)
     assert "two.txt: balls 1 and 2 strike at " in printed.err
-    with pytest.raises(SystemExit):
-        run(shlex.split(f"{line} --striker 0"))
-    assert "--striker = 0; must be a whole number, from 1 to 4" in capsys.readouterr().err
+    for wrong, words in (
+        ("", "if several balls were lifted, name all strikers"),
+        ("--striker 0", "--striker = 0; must be a whole number, from 1 to 4"),
+    ):
+        with pytest.raises(SystemExit):
+            run(shlex.split(f"{line} {wrong}"))
+        assert words in capsys.readouterr().err
 
 
 def test_fit_of_a_swing(folder):

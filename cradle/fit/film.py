@@ -177,6 +177,7 @@ def _around(
             if min(marks) < _LEAST:
                 told = f"{marks[0]} marks before and {marks[1]} after the impact at {time:.4g} s"
                 told += f" within window = {window:g} s; needs {_LEAST} on each side"
+                told += " (if several balls were lifted, name all strikers)" * (len(movers) == 1)
                 raise ValueError(f"track {name!r} has {told}")
             used.append(Track(t[near], x[near]))
         time, places = _moment(used, time, length, movers)
