@@ -62,8 +62,17 @@ class Chain:
             raise ValueError(f"restitution has shape {e.shape}; {m.size} balls {rule}")
         if not usual:
             asked.refuse_overflow(v, m)
-        own = {"masses": np.array(m), "velocities": np.array(v)}
-        for name, value in (own | {"restitution": np.full(m.size - 1, e)}).items():
+        self._keep(np.array(m), np.array(v), np.full(m.size - 1, e))
+
+    @classmethod
+    def _of(cls, masses: Vector, velocities: Vector, restitution: Vector) -> "Chain":
+        """Return the chain of new arrays, or parts of a chain's, without asking them again."""
+        chain = object.__new__(cls)
+        chain._keep(masses, velocities, restitution)
+        return chain
+
+    def _keep(self, *values: Vector) -> None:
+        for name, value in zip(("masses", "velocities", "restitution"), values, strict=True):
             value.flags.writeable = False
             vars(self)[name] = value
 

@@ -77,9 +77,9 @@ def test_unusual_values_that_are_good_are_kept(name):
         ({"restitution": [1, 1.5]}, "restitution[1] = 1.5; must lie in [0, 1]"),
     ],
 )
-@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions()])
+@pytest.mark.parametrize("model", [ImpulseCorrelation(0.1), SequentialCollisions("right")])
 def test_a_chain_that_was_not_asked_is_refused_where_it_is_solved(part, words, model):
-    """The event loop asks, too, and its words are those of `Chain`."""
+    """Such as a part of a swing: the event loop asks, and the words are those of `Chain`."""
     values = {name: np.array(value, float) for name, value in (GOOD | part).items()}
     vars(chain := object.__new__(Chain)).update(values)
     name = words[: words.index("[")]

@@ -53,7 +53,7 @@ class SequentialCollisions:
         if self.order == "right":
             # The leftmost contact of the mirror image is the rightmost of the chain.
             m, v, e = chain.masses[::-1], 0.0 - chain.velocities[::-1], chain.restitution[::-1]
-            seen = Chain(m, v, e)
+            seen = Chain._of(m, v, e)
         try:
             return self._own(ImpulseCorrelation(0.0, max_events=self.max_events).solve(seen), chain)
         except ImpactNotFinished as stopped:

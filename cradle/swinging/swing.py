@@ -239,7 +239,7 @@ class _Run:
             vars(law)["gaps"] = tuple(self.gaps()[first : last - 1].tolist())
         try:
             # Not by `collide`, whose advice on a long path cannot be taken here.
-            trace: Trace = law.solve(Chain(m, before[first:last], e), **more)
+            trace: Trace = law.solve(Chain._of(m, before[first:last].copy(), e), **more)
         except ValueError as refused:
             refused.add_note(f"at the impact at t = {self.t} s, balls {first} to {last - 1}")
             raise
