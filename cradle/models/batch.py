@@ -173,7 +173,7 @@ def in_order(
 
         ended = in_order(solve, count, size, progress=False)
         yield from tqdm(ended, total=len(chunks), unit="chunk")
-    elif (workers := min(len(chunks), os.cpu_count() or 1)) < 2:
+    elif len(chunks) < 2 or (workers := min(len(chunks), os.cpu_count() or 1)) < 2:
         yield from map(solve, chunks)
     else:
         from concurrent.futures import ThreadPoolExecutor
@@ -190,11 +190,11 @@ def in_order(
 def rows_of(array: Vector, lead: tuple[int, ...], rows: slice) -> Vector:
     """Return some rows of `array` broadcast to the leading shape."""
     size = array.shape[-1]
+    if array.shape[:-1] == lead and array.flags.c_contiguous:
+        part = array.reshape(math.prod(lead), size)[rows]
+        # Compiled code is made for aligned arrays that may be written to; it writes to no input.
+        return part if part.flags.carray else part.copy()
     if array.size == size:
         return np.full((rows.stop - rows.start, size), array.reshape(size))
-    if array.shape[:-1] == lead and array.flags.c_contiguous:
-        part = array.reshape(-1, size)[rows]
-        # Compiled code is made for arrays that may be written to; it writes to no input.
-        return part if part.flags.writeable else part.copy()
     full = np.broadcast_to(array, (*lead, size))  # without making the others
     return full[np.unravel_index(np.arange(rows.start, rows.stop), lead)]
