@@ -467,7 +467,7 @@ def test_laws_beside_the_film():
         assert int(re.search(r"\d", NAMES[name])[0]) == (name != "touching") * len(p)
         if name in ("pairs", "touching", "one", "three", "energy"):
             CHAPTER.tells({f"film-{name}": max(off)}, off=0.051)
-        if name in ("one", "energy"):  # "the other laws are within"
+        if name in ("one", "energy"):  # "the other three are within"
             assert max(off) < float(CHAPTER.glued["film-touching"]) + 0.5
 
 

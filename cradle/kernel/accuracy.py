@@ -192,7 +192,8 @@ def defect_of(n, law, s, clock):
     """Return what the outcome breaks, or 0: order, momentum, energy."""
     rounding = 2.0**-52 * (64.0 + clock.effort)
     size = change = gained = energy = 0.0
-    slowest, ordered = max(FAINT * law.accuracy, REST if clock.leans > 0.0 else 0.0), True
+    slowest = max(FAINT * law.accuracy, REST if clock.leans > 0.0 else 0.0)
+    ordered = True
     for i in range(n):
         a = s[i]
         v, old, m = a.after, a.start, 1.0 / a.w

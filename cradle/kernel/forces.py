@@ -247,10 +247,11 @@ def parted(n, slow, s, clock):
     """
     h = late = clock.h
     soon = before = held = swings = drawn = 0.0
+    most = max(slow, REST)
     for i in range(n):
         a = s[i]
         push = a.f - a.pull
-        if a.f > 0.0 and push * push * a.w > max(slow, REST) * max(slow, REST) * a.g:
+        if a.f > 0.0 and push * push * a.w > most * most * a.g:
             return False  # most steps end here
         a.dv = a.w * (before - push)
         a.free = a.v + a.w * (held - a.spent) - 0.5 * h * a.dv
@@ -279,7 +280,8 @@ def parted(n, slow, s, clock):
         elif gain < 0.0:
             late = min(late, u / gain)
     # What still swings goes on, while one that is pulled comes back.
-    ended = soon <= late and swings <= (REST * REST if drawn > 0.0 else slow * slow)
+    rest = REST if drawn > 0.0 else slow
+    ended = soon <= late and swings <= rest * rest
     for i in range(n if ended else 0):
         s[i].v = s[i].free - late * s[i].dv
     return ended
