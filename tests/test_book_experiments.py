@@ -377,12 +377,16 @@ def test_fig_experiments_structure_shows_table_2():
     part = TABLE_2.ratio / TABLE_2.bound
     (ax,) = FIGURES.figures["fig-experiments-structure"].axes
     names = [label.get_text().split()[0] for label in ax.get_xticklabels()]
-    expected = [(names.index("".join(sorted(t[:2]))), part[t]) for t in part.index]
+    column = [names.index("".join(sorted(t[:2]))) for t in part.index]
+    expected = [  # beside its column, on the side of the middle ball's letter
+        (x + 0.2 * np.sign(ord(t[1]) - ord(t[0])), part[t])
+        for x, t in zip(column, part.index, strict=True)
+    ]
     for kind in "ABCD":  # of the middle ball
         here = [place for t, place in zip(part.index, expected, strict=True) if t[1] == kind]
         np.testing.assert_allclose(lines(ax)[kind], here, rtol=1e-12)
     for x, (_, bar) in enumerate(points(ax, 2)[1:]):
-        assert bar[1] == pytest.approx(np.median([y for at, y in expected if at == x]))
+        assert bar[1] == pytest.approx(np.median([y for at, y in expected if round(at) == x]))
 
 
 def test_fig_experiments_identify_as_drawn():
