@@ -133,18 +133,7 @@ def described(
     if model == "sequential":
         law = cradle.SequentialCollisions()
     elif model == "spheres":
-        kind = "elastic spheres"
-        try:
-            k, wide = one_or_all(stiffness or [1.0]), one_or_all(gaps or [0.0])
-            law = cradle.SpringChain(k, viscosity=own_viscosity(chain, k), gaps=wide)
-            taken = cradle.Chain(chain.masses, chain.velocities)
-            if law.viscosity:
-                kind = f"viscous spheres; restitution at {chain.closing_speeds.max():.3g} m/s"
-        except ValueError:
-            if gaps or (chain.restitution == 1.0).all():
-                raise  # it is not the restitution
-            law = cradle.EnergyDistribution(one_or_all(stiffness or [1.0]))
-            kind = "spheres that lose more than viscous ones can, by the energy law"
+        taken, law, kind = as_spheres(chain, stiffness, gaps)
         assumed += [f"the balls collide as {kind} (--model, --ratio)"] if bare else []
         alike = stiffness is not None or np.ptp(chain.masses) == 0.0
         assumed += [] if alike else ["equally stiff contacts (--stiffness)"]
@@ -155,6 +144,23 @@ def described(
     if sides and isinstance(law, cradle.ImpulseCorrelation):
         assumed += ["what is struck from both sides is driven by the left contact (rule R2)"]
     return Described(chain, taken, law, tuple(assumed), letters)
+
+
+def as_spheres(
+    chain: cradle.Chain, stiffness: list[float] | None, gaps: list[float] | None
+) -> tuple[cradle.Chain, cradle.Model, str]:
+    """Return a chain as spheres take it, their law, and what kind of spheres they are."""
+    k, wide = one_or_all(stiffness or [1.0]), one_or_all(gaps or [0.0])
+    try:
+        law = cradle.SpringChain(k, viscosity=own_viscosity(chain, k), gaps=wide)
+    except ValueError:
+        if gaps or (chain.restitution == 1.0).all():
+            raise  # it is not the restitution
+        lossy = "spheres that lose more than viscous ones can, by the energy law"
+        return chain, cradle.EnergyDistribution(k), lossy
+    viscous = f"viscous spheres; restitution at {chain.closing_speeds.max():.3g} m/s"
+    kind = viscous if law.viscosity else "elastic spheres"
+    return cradle.Chain(chain.masses, chain.velocities), law, kind
 
 
 def as_one(alike: bool, gaps: list[float] | None, model: str | None) -> list[str]:

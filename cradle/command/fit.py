@@ -97,10 +97,7 @@ def fit(
                              for name in ("chi_square", "degrees_of_freedom")}  # fmt: skip
     left = [one.name for one in shots.sets if one not in used.sets]
     extra |= {"momentum_chi_square": momentum, "shots": count, "without": left}
-    poor = " (a poor fit: the errors do not explain the differences)"
-    quality = [f"fit of {'ratios' if one is last else 'restitution'}: chi-square "
-               f"{one.chi_square:.1f} of {one.degrees_of_freedom}"
-               f"{poor * (one.probability <= 1e-3)}" for one in fits]  # fmt: skip
+    quality = [_quality(one, "ratios" if one is last else "restitution") for one in fits]
     notes = ["fit: no ratio is fitted; those of --known are taken as they are"]
     notes *= bool(known and not last.estimates)
     whole = " (all of the file)" * bool(left)
@@ -118,6 +115,13 @@ def fit(
     lines = ["intervals: 95 % confidence sets", *folds, *quality, *notes]
     rows = [row for one in fits for row in one.rows()]
     show(rows, extra, "\n".join(lines), as_json, as_csv, RESULT_COLUMNS)
+
+
+def _quality(found: Any, what: str) -> str:
+    """Return how well a fit explains the shots."""
+    poor = " (a poor fit: the errors do not explain the differences)"
+    told = f"fit of {what}: chi-square {found.chi_square:.1f} of {found.degrees_of_freedom}"
+    return told + poor * bool(found.probability <= 1e-3)
 
 
 def named_number(given: str) -> tuple[str, tuple[float, float]]:
