@@ -131,7 +131,7 @@ def on_springs(pulled, duration=MINUTE, *, contact=STEEL, steps_a_contact=100, a
     return _march(angle, int(duration * FRAMES), inner, pressed(contact)[1], gaps)
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _march(angle, frames, inner, stiffness, gaps):
     """Velocity Verlet for pendulums whose balls repel each other by k d^(3/2), in the plane."""
     n = len(angle)

@@ -69,6 +69,21 @@ def apart(found, judge):
     return 0.5 * np.abs(one - other).sum(axis=1)
 
 
+def strokes(run):
+    """Energies after the strokes of a run: times, angles, rates."""
+    return scenes.strokes(*run[1:])
+
+
+each_engine = pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+
+
+def anew(engine, setting, pulled, duration=5.6, **how):
+    """Strokes of an engine; a test of one that is not installed is skipped."""
+    if engine.name in absent(scenes.ENGINES):
+        pytest.skip(absent(scenes.ENGINES)[engine.name])
+    return strokes(scenes.in_engine(engine, setting, pulled, duration=duration, **how))
+
+
 def slower(found, judge, pulled):
     """Largest difference of a ball's speed of several runs, in percent of the strikers'."""
     one, other = (
@@ -142,14 +157,11 @@ def test_the_tables_are_complete():
     assert numbers.min() >= 0
 
 
-@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@each_engine
 @pytest.mark.parametrize(("how", "mend"), [("as it is", False), ("mended", True)])
 def test_an_engine_repeats_what_is_stored(engine, how, mend):
     """Same version, same strokes; another one is asked only for what the row promises."""
-    if engine.name in absent(scenes.ENGINES):
-        pytest.skip(absent(scenes.ENGINES)[engine.name])
-    _, angles, rates = scenes.in_engine(engine, "default", 1, mend=mend, duration=5.6)
-    found, expected = scenes.strokes(angles, rates), run(engine.name, how, "default")
+    found, expected = anew(engine, "default", 1, mend=mend), run(engine.name, how, "default")
     assert len(found) == 5
     (version,) = {row["version"] for row in stored("costs", run=engine.name)}
     if version.startswith(versions(engine.distribution).split("; ")[0]):
@@ -159,7 +171,7 @@ def test_an_engine_repeats_what_is_stored(engine, how, mend):
         np.testing.assert_allclose(share, run("swing", "alone", "ratio")[:5], atol=0.03)
 
 
-@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@each_engine
 @pytest.mark.parametrize("duration", [60, pytest.param(600, marks=pytest.mark.exhaustive)])
 def test_short_strings_at_60_hz_keep_what_one_pendulum_keeps(monkeypatch, engine, duration):
     """Strings of 20 cm, where a step is 6 % of a swing.
@@ -181,8 +193,7 @@ def test_short_strings_at_60_hz_keep_what_one_pendulum_keeps(monkeypatch, engine
 
 
 def test_swing_repeats_what_is_stored():
-    _, angles, rates = scenes.by_swing(1, 5.6)
-    found = scenes.strokes(angles, rates)
+    found = strokes(scenes.by_swing(1, 5.6))
     np.testing.assert_allclose(found, run("swing", "alone", "ratio")[:5], atol=1e-4)
 
 
@@ -351,8 +362,7 @@ def test_depths_of_the_program():
 
 def test_the_judge_of_outer_balls_apart():
     """Gaps of three depths; its first stroke is the impact that the law of the row computes."""
-    _, angles, rates = scenes.on_springs(2, 1.5, apart=scenes.APART)
-    found = scenes.strokes(angles, rates)[0]
+    found = strokes(scenes.on_springs(2, 1.5, apart=scenes.APART))[0]
     stored_one = by_law("Hertz springs", "springs, outer apart", "alone", 2)[0]
     np.testing.assert_allclose(found, stored_one, atol=1e-4)
     pressed = collide(Chain([1, 1], [scenes.SPEED, 0]), SpringChain(scenes.STIFFNESS))
@@ -406,15 +416,10 @@ def test_the_gaps_of_a_law_hold_for_the_first_strokes():
     assert said[1] - said[0] > 10
 
 
-@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@each_engine
 @pytest.mark.parametrize("law", scenes.LAWS)
 def test_an_engine_repeats_what_is_stored_of_other_laws(engine, law):
-    if engine.name in absent(scenes.ENGINES):
-        pytest.skip(absent(scenes.ENGINES)[engine.name])
-    _, angles, rates = scenes.in_engine(
-        engine, "default", 2, mend=True, duration=5.6, law=scenes.LAWS[law]
-    )
-    found = scenes.strokes(angles, rates)[[0, 4]]
+    found = anew(engine, "default", 2, mend=True, law=scenes.LAWS[law])[[0, 4]]
     np.testing.assert_allclose(found, by_law(engine.name, law, "default", 2)[:2], atol=0.02)
 
 
@@ -483,14 +488,10 @@ def test_tiny_gaps_want_a_small_step():
 
 @pytest.mark.parametrize("name", ["Chipmunk", "Box2D"])
 def test_an_engine_repeats_what_is_stored_with_tiny_gaps(name):
-    engine = {engine.name: engine for engine in scenes.ENGINES}[name]
-    if name in absent(scenes.ENGINES):
-        pytest.skip(absent(scenes.ENGINES)[name])
-    _, angles, rates = scenes.in_engine(
-        engine, "fine", 1, mend=False, gap=scenes.GAPS[1], duration=5.6
-    )
+    (engine,) = (engine for engine in scenes.ENGINES if engine.name == name)
+    found = anew(engine, "fine", 1, mend=False, gap=scenes.GAPS[1])
     (row,) = stored("gap_minutes", run=name, setting="fine", pulled=1, stroke=5)
-    np.testing.assert_allclose(scenes.strokes(angles, rates)[4], balls(row), atol=0.02)
+    np.testing.assert_allclose(found[4], balls(row), atol=0.02)
 
 
 def test_the_recipe_tells_where_the_energy_is():
@@ -641,7 +642,7 @@ def test_who_arrives_together_by_the_film():
         np.testing.assert_allclose([float(x) for x in said], 100 * v, atol=0.51)
 
 
-@pytest.mark.parametrize("engine", scenes.ENGINES, ids=lambda engine: engine.name)
+@each_engine
 def test_stored_first_strokes_with_gaps(engine):
     """Where a gap is stored elsewhere, the same; an engine that is here repeats the smallest."""
     rows = stored("gaps", run=engine.name)
@@ -652,8 +653,5 @@ def test_stored_first_strokes_with_gaps(engine):
             known = run(engine.name, "as it is", row["setting"], row["pulled"], row["gap"])[0]
             np.testing.assert_allclose(own, known, atol=0.05)
         elif engine.name not in absent(scenes.ENGINES) and row["pulled"] == "1":
-            gap = float(row["gap"])
-            _, angles, rates = scenes.in_engine(
-                engine, row["setting"], 1, mend=False, gap=gap, duration=1.3
-            )
-            np.testing.assert_allclose(scenes.strokes(angles, rates)[0], own, atol=0.05)
+            found = anew(engine, row["setting"], 1, 1.3, mend=False, gap=float(row["gap"]))
+            np.testing.assert_allclose(found[0], own, atol=0.05)
