@@ -3,7 +3,6 @@
 from decimal import Decimal
 
 import judge as court
-import numpy as np
 import pytest
 from delicate import CHAINS, chains_of
 from families import JUDGED, family
@@ -26,11 +25,14 @@ def test_named_chain(name):
 def test_a_tie_decided_by_products_of_tiny_ratios(name):
     """Beyond 32 digits: the textbook decides it, in decimals; the loop alone would be wrong."""
     problem = CHAINS[name].problem
-    assert judge(problem).word == "right"
-    assert problem.collide().margin == margin(problem) == 0.0
+    right = exact(on_bounds(problem)).velocities
+    for found in (problem.collide(), problem.solve(outcomes, excess="saturate")):
+        assert off(problem, found.velocities.tolist(), right) <= court.WRONG
+        assert found.margin == 0.0
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(package, "answer", lambda *_: False)
-        assert judge(problem).word in ("wrong", "unfinished")
+        loop = [ask(problem) for ask in (batch, court.single)]
+    assert None in loop or max(off(problem, one, right) for one in loop) > court.WRONG
     clear = [[1e-4 if x == 1e-20 else x for x in side] for side in problem[3:5]]
     clear = problem._replace(forward=clear[0], backward=clear[1])
     assert judge(clear).word == "right"
@@ -52,12 +54,6 @@ SAMPLE = {
 #: Begins with fifty chains of "losses" of which one was wrong by .1 when first judged.
 SEED = 2026007778
 REFUTED = ("wrong", "other reading")
-
-
-def margin(problem):
-    """What a batch says of how sure it is."""
-    *parts, meeting = problem
-    return outcomes(*parts, meeting=meeting, excess="saturate").margin
 
 
 def no_wrong_chain(name, count, seed, **options):
@@ -131,8 +127,7 @@ def test_velocities_that_other_codes_gave():
     assert max(abs(float(v) - w) for v, w in zip(right, printed, strict=True)) < 5.1e-9
 
 
-#: Two contacts that close on the third ball: in decimals both closed at .1 m/s, in doubles not.
-TIE = Problem([1.0] * 5, [1.0, 0.1, 0.2, 0.3, -1.0], [1.0] * 4, [0.1] * 3, [0.1] * 3)
+TIE = CHAINS["two contacts that close on one ball at once in decimals"].problem
 
 
 def answering(by=0.0, read=meaning):
@@ -145,18 +140,16 @@ def test_it_can_say_no():
     assert judge(TIE, answering(), answering(2e-9)).word == "wrong"
     assert judge(TIE, answering(), lambda _: None).word == "unfinished"
     assert judge(TIE, answering(read=Decimal)).word == "other reading"
-    beside = Problem([1.0, 3.0, 4.0], [1.0, 0.0, 0.0], [1.0, 1.0], [4 / 7], [0.0])
+    beside = CHAINS["a ratio on a bound that is no float"].problem
     bound = exact(on_bounds(beside)).velocities
     assert exact(beside).velocities != bound
     assert judge(beside, lambda _: bound).word == "right"
 
 
 def test_a_bound_is_meant_as_floats_draw_it():
-    """Here the exact one is farther than four roundings: a light ball leaves it few digits."""
-    forward = [0.4267100977198693, 0.9160305343511449, 0.6333333333333333, 8 / 19]
-    masses, rest = [1.0, 4.0, 0.25, 1.0, 1.0, 1.0], [0.0] * 4
-    assert largest_ratios(masses, forward, rest)[0][:3].tolist() == forward[:3]
-    problem = Problem(masses, [1.0, 0.0, *rest], [1.0] * 5, forward, rest)
+    problem = CHAINS["a bound as floats draw it"].problem
+    m, _, _, forward, backward, _ = problem
+    assert largest_ratios(m, forward, backward)[0][:3].tolist() == forward[:3]
     as_it_is = [float(v) for v in exact(problem).velocities]
     assert off(problem, as_it_is, batch(problem)) > 5e-9
     assert judge(problem).word == "right"
@@ -165,28 +158,15 @@ def test_a_bound_is_meant_as_floats_draw_it():
 
 def test_a_bound_counts_on_what_is_in_force_beyond():
     """Ball 3's ratio is above its bound, 1/2, and held there; with it ball 2's bound is 2/3."""
-    problem = Problem([1.0] * 5, [1.0] + [0.0] * 4, [1.0] * 4, [0.0, 2 / 3, 1.0], [0.0] * 3)
+    problem = CHAINS["a bound that follows from a ratio above its own"].problem
     assert judge(problem).word == "right"
     as_it_stands = [float(v) for v in exact(problem).velocities]
     assert judge(problem, lambda _: as_it_stands).word == "other reading"
 
 
-@pytest.mark.parametrize(
-    ("masses", "forward", "meeting"),
-    [
-        # Between four roundings and five from its bound, as a user may draw it.
-        ([1, 4, 0.25, 0.25, 4, 3],
-         [0.6521739130434776, 0.9666666666666666, 0.9655172413793103, 3 / 7], 0.0),
-        # On a bound that comes into force when a neighbour has ended.
-        ([1, 1, 4, 0.25, 3, 1, 1, 1, 1],
-         [0, 0.6595744680851058, 0.9677419354838709, 0.6, 0, 0, 0.25], 0.5),
-    ],
-)  # fmt: skip
-def test_a_bound_is_meant_whenever_it_comes_into_force(masses, forward, meeting):
-    n = len(masses)
-    problem = Problem(
-        masses, np.eye(n)[0].tolist(), [1.0] * (n - 1), forward, [0.0] * (n - 2), meeting
-    )
+@pytest.mark.parametrize("name", chains_of("a bound in force"))
+def test_a_bound_is_meant_whenever_it_comes_into_force(name):
+    problem = CHAINS[name].problem
     assert judge(problem).word == "right"
     fixed = exact(on_bounds(problem)).velocities
     assert off(problem, batch(problem), fixed) > court.WRONG
@@ -212,7 +192,7 @@ def test_a_gap_that_closes_at_once():
 
 def test_a_sequence_without_end():
     """Two balls press a light one; and a light ball that goes to and fro some thousand times."""
-    pressed = Problem([1.0, 0.04, 1.0], [1.0, 0.0, 0.0], [0.5, 0.5], [0.15], [0.15])
+    pressed = CHAINS["two balls press a light one"].problem
     assert judge(pressed).word == "endless"
     assert second_opinion(pressed).word == "as 50 digits"
     long = Problem([1.0, 1e-7, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0], [0.0], [0.0])
