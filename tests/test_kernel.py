@@ -20,7 +20,7 @@ import pytest
 import tqdm
 from chains import random_chains, with_ends
 from families import JUDGED, family
-from kernels import needs_numba
+from kernels import needs_numba, runtimes
 from plain import solve
 
 from cradle import (
@@ -457,7 +457,7 @@ def test_no_function_is_inlined_that_is_meant_to_stand_apart():
 LONG = np.ones(30), np.eye(30)[0], np.full(29, 0.9), np.full(28, 0.1), np.full(28, 0.1)
 
 
-@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
+@runtimes
 @pytest.mark.parametrize("effort", [1, 1000])
 def test_pauses_do_not_change_a_bit(plain, monkeypatch, on, effort):
     plain(on)
@@ -500,7 +500,7 @@ def test_the_same_bits_if_it_goes_on_compiled_midway(monkeypatch):
         assert one.tobytes() == other.tobytes()
 
 
-@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
+@runtimes
 def test_a_path_grows_with_its_impact(plain, on):
     """Longer than the room made first; the same as in room enough from the start."""
     plain(on)
@@ -520,7 +520,7 @@ def test_a_path_grows_with_its_impact(plain, on):
     assert impulses == trace.path_impulses.tolist()
 
 
-@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
+@runtimes
 def test_the_path_is_kept_if_asked_for_or_up_to_a_bound(plain, on, monkeypatch):
     plain(on)
     chain, model = Chain(*LONG[:3]), ImpulseCorrelation(*LONG[3:])
@@ -555,7 +555,7 @@ def test_a_path_holds_ten_million_numbers_unless_asked_for(monkeypatch):
             collide(chain, SequentialCollisions())
 
 
-@pytest.mark.parametrize("on", [True, pytest.param(False, marks=needs_numba)])
+@runtimes
 def test_progress_of_one_long_impact_is_shown(plain, capsys, on, monkeypatch):
     plain(on)
     monkeypatch.setattr(drive, "_EFFORT", {False: 1000, True: 1000})
@@ -604,7 +604,7 @@ def test_ctrl_c_works_at_once(work, wish):
         try:
             assert process.stdout.readline() == "begins\n"
             begun = time.perf_counter()
-            time.sleep(1)
+            time.sleep(0.4)
             assert process.poll() is None
             process.send_signal(signal.SIGINT)
             waited = time.perf_counter() - begun
