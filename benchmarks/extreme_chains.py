@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 from chains import magnitudes, power_of_ten, uniform, with_ends, within_bounds
-from problem import case
+from problem import Problem, case
 from truth import EventLimit, as_meant
 
 from cradle import ImpactNotFinished, outcomes, paper_chain, post_impact_velocities
@@ -29,9 +29,7 @@ RANGES |= dict.fromkeys(("restitution", "forward", "backward"), (0.0, 1.0))
 
 
 def sequence(name):
-    chain, model = paper_chain(name, excess="saturate")
-    own = chain.masses, chain.velocities, chain.restitution
-    return case(*own, model.forward, model.backward)
+    return Problem.of(*paper_chain(name, excess="saturate"))
 
 
 # --- what must hold ------------------------------------------------------------------------

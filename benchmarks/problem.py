@@ -27,6 +27,12 @@ class Problem(NamedTuple):
     backward: list
     meeting: float = 0.5
 
+    @classmethod
+    def of(cls, chain, model):
+        """The problem of a chain and its model."""
+        own = chain.masses, chain.velocities, chain.restitution
+        return case(*own, model.forward, model.backward, model.meeting)
+
     def solve(self, solver, **options):
         """By `textbook.solve`, `truth.solve` or anything that is called like them."""
         return solver(*self[:5], meeting=self.meeting, **options)

@@ -12,6 +12,7 @@ import pytest
 from chains import ELASTIC, HERTZ, magnitudes, striking, uniform, within_bounds
 from dop853 import integrated
 from energy_law import strike
+from problem import Problem
 from stored import read
 from truth import in_fifty_digits
 
@@ -115,10 +116,7 @@ def test_events_against_fifty_digits():
     for chain, ratios in given:
         advice = recommend(chain, "path", ratios=ratios, accuracy=1e-12)
         assert (advice.model, advice.call) == (ratios, "collide(advice.chain, advice.model)")
-        ways = [ratios.forward, ratios.forward if ratios.backward is None else ratios.backward]
-        forward, backward = (np.broadcast_to(part, len(chain) - 2).tolist() for part in ways)
-        own = chain.masses, chain.velocities, chain.restitution
-        answer = in_fifty_digits(*own, forward, backward)
+        answer = in_fifty_digits(*Problem.of(chain, ratios)[:5])
         assert advice.numerical_error * (1 if len(advice.measured_on) == 1 else 10) <= 1e-12
         assert off(chain, advice, answer) <= 10 * advice.numerical_error + ROUNDING
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from chains import local_orders
 from delicate import CHAINS, chains_of, seen
-from truth import meaning, solve
+from problem import Problem
+from truth import meaning
 
 from cradle import Chain, ImpulseCorrelation, collide, textbook
 
@@ -19,11 +20,8 @@ def solved(masses, velocities, restitution, forward, backward=None, **options):
 
 def agrees(trace, atol=1e-13):
     """Compare with fifty digits (and in every event, if none collapsed); return that outcome."""
-    chain, model = trace.chain, trace.model
-    own = (part.tolist() for part in (chain.masses, chain.velocities, chain.restitution))
     with localcontext(prec=50):
-        ratios = {"forward": model.forward, "backward": model.backward, "meeting": model.meeting}
-        exact = solve(*own, **ratios, number=meaning)
+        exact = Problem.of(trace.chain, trace.model).exact(1_000_000, number=meaning)
         after = [float(v) for v in exact.velocities]
         impulses = [float(p) for p in exact.impulses]
     np.testing.assert_allclose(trace.velocities, after, rtol=0, atol=atol)

@@ -95,12 +95,7 @@ def test_many_chains_of_a_family(name):
 
 def against_the_package(chain, model, tolerance=1e-13):
     """The second reading's changes; its velocities and changes are those of `collide`."""
-    given = Problem(
-        *(part.tolist() for part in (chain.masses, chain.velocities, chain.restitution)),
-        *([float(a) for a in way] for way in (model.forward, model.backward)),
-        float(model.meeting),
-    )
-    velocities, events = read(given)
+    velocities, events = read(Problem.of(chain, model))
     trace = collide(chain, model)
     np.testing.assert_allclose(
         trace.velocities, [float(v) for v in velocities], rtol=0, atol=tolerance

@@ -10,6 +10,7 @@ import pytest
 import tqdm
 from chains import SPRINGS, magnitudes, striking, uniform
 from dop853 import integrated
+from families import struck
 from hypothesis import given
 from hypothesis import strategies as st
 from kernels import needs_numba
@@ -34,10 +35,6 @@ from cradle.kernel import kinks
 from cradle.kernel.state import REFUSED, UNFINISHED, UNSOUND
 from cradle.runtime import compile as runtime
 from cradle.runtime import job
-
-
-def struck(n):
-    return [1.0] + [0.0] * (n - 1)
 
 
 def read(cells):
