@@ -151,7 +151,7 @@ def test_masses_of_fifteen_decades_are_solved_and_of_more_refused():
 
 
 #: Chains of a family.  Products of tiny ratios take tens of milliseconds each, over decimals.
-COUNT, FEWER = 400, {"tiny ratios": 40}
+COUNT, FEWER = 400, {"tiny ratios": 20}
 
 
 def finished(name, count, seed):

@@ -536,12 +536,10 @@ def test_the_recipe_tells_where_the_energy_is():
     for column, name in ((1, "own"), (2, "row")):
         parts = sorted(int(row[column]) for row in rows)
         assert chapter.glued[f"single-{name}"] == f"{parts[0]} to {parts[-1]}"
-    rows = stored("costs", how="mended", setting="fine", pulled=1)
-    times = [1e3 * float(row["seconds"]) for row in rows]
-    assert chapter.glued["milliseconds"] == f"{min(times):.0f} to {max(times):.0f}"
-    rows = stored("costs", how="as it is", setting="fine", pulled=1)
-    times = [1e3 * float(row["seconds"]) for row in rows]
-    assert chapter.glued["bare"] == f"{min(times):.0f} to {max(times):.0f}"
+    for how, name in (("mended", "milliseconds"), ("as it is", "bare")):
+        rows = stored("costs", how=how, setting="fine", pulled=1)
+        times = [1e3 * float(row["seconds"]) for row in rows]
+        assert chapter.glued[name] == f"{min(times):.0f} to {max(times):.0f}"
     law = "springs, outer apart"
     left = {
         (name, s): min(by_law(name, law, s, pulled)[-1].sum() for pulled in (1, 2))
