@@ -66,14 +66,13 @@ def test_two_strikers_that_come_as_one():
     slower, apart = real_cradles.SLOWER, real_cradles.APART
     second, third, *_ = spheres([slower, 0, 0, 0], [0, *GAPS[1:3]], GAPS[3]) / slower
     still = apart * (third - second) / (1 - second)
-    CHAPTER.tells({"still": 1e6 * UNIT * still})
+    APPENDIX.tells({"still": 1e6 * UNIT * still})
     left, right = spheres([slower, 0], [0], GAPS[3]) / slower
     CHAPTER.tells({"loss-e": right - left})
     # Two balls press each other by (5/8)^0.4 units, which grow as v^(4/5).
     deepest = 0.625**0.4
-    CHAPTER.tells(
-        {"pressed": 1e6 * UNIT * deepest, "pressed-slow": 1e6 * UNIT * deepest * slower**0.8}
-    )
+    CHAPTER.tells({"pressed": 1e6 * UNIT * deepest})
+    APPENDIX.tells({"pressed-slow": 1e6 * UNIT * deepest * slower**0.8})
     parts = [float(x) for x in GLUED["part"].split(", ")]
     assert parts == pytest.approx([100 * gap / deepest for gap in GAPS[:3]], abs=0.51)
 
@@ -155,6 +154,7 @@ def test_fig_off_and_the_table_of_three_laws():
         "apart": "apart",
         "speed": "striker",
         "gaps-e": "loss-e",
+        "gap-wanted": "gap-wanted",
         "ratio-wanted": "ratio-wanted",
         "ratio-wanted-error": "ratio-wanted-error",
         "rough-chance": "rough-chance",
@@ -370,10 +370,10 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
         ends = [float(x) for x in shown.split(" µm")[0].split(" to ")]
         assert ends == pytest.approx([min(of_all), max(of_all)], abs=0.06)
     for name, n in (("fit", 3), ("test", 4)):  # where one film in twenty has more
-        most = float(GLUED[f"right-{name}"])
+        most = float(TOLD[f"right-{name}"])
         assert gammaincc(n / 2, most / 2) == pytest.approx(0.05, abs=2e-3)
     edges = (0.05, 0.095, 0.175, 0.4, 1.1, 9)
-    lines = CHAPTER.printed("distance-table").splitlines()[1:]
+    lines = APPENDIX.printed("distance-table").splitlines()[1:]
     for line, low, high in zip(lines, edges, edges[1:]):
         group = [row for row in rows if low < unit * row["apart"] <= high]
         *shown, words = re.search(
@@ -406,6 +406,32 @@ def test_gaps_chosen_anew_for_each_distance_of_two_strikers():
     CHAPTER.tells({"apart": real_cradles.APART * unit})
 
 
+def test_the_figure_of_the_distances():
+    """Curves of what is stored; thick where neither chi-square is one of the twentieth largest."""
+    unit = 1e3 * UNIT  # mm
+    rows = [row for row in numbers("film_distances.csv") if row["apart"]]
+    at = np.array([unit * row["apart"] for row in rows])
+    passes = np.array([
+        gammaincc(1.5, row["both"] / 2) > 0.05 and gammaincc(2, row["three"] / 2) > 0.05
+        for row in rows
+    ])  # fmt: skip
+    axes = CHAPTER.figures["fig-real-distance"].axes
+    for ax, column, n in zip(axes, ("both", "three"), (3, 4), strict=True):
+        thin, thick = (line.get_xydata() for line in ax.get_lines()[:2])
+        expected = np.array([row[column] for row in rows])
+        assert thin == pytest.approx(np.column_stack([at, expected]), rel=1e-3)
+        assert (np.isfinite(thick[:, 1]) == passes).all()
+        assert thick[passes] == pytest.approx(thin[passes])
+        band = ax.patches[0].get_extents().transformed(ax.transData.inverted())
+        assert gammaincc(n / 2, band.y1 / 2) == pytest.approx(0.05, abs=1e-6)
+    assert axes[1].get_lines()[2].get_ydata()[0] == pytest.approx(sums_of("ratios"), rel=1e-3)
+    words = [x.get_text() for x in axes[1].texts if x.get_text() != "ratios"]
+    assert words == ["fails", "passes", "doubtful", "passes", "doubtful"]
+    ends = at[np.flatnonzero(np.diff([False, *passes, False])) - [0, 1, 0, 1]]
+    told = " to ".join([GLUED["pass-near"], GLUED["pass-far"]]).split(" to ")
+    assert [float(x) for x in told] == pytest.approx(ends, abs=0.006)
+
+
 def test_the_jump_where_the_fit_changes_over_between_two_sets_of_gaps():
     """Each set, sought by the fitting script on both sides, and tested by another integrator."""
     *rows, _ = numbers("film_distances.csv")
@@ -416,15 +442,15 @@ def test_the_jump_where_the_fit_changes_over_between_two_sets_of_gaps():
         for side, row in sides.items():
             fit, p = real_cradles.best_at(row["apart"], data, [start])
             fits[side, name] = fit
-            CHAPTER.tells({f"jump-{name}": 1e6 * UNIT * p[2]}, off=0.03)
+            APPENDIX.tells({f"jump-{name}": 1e6 * UNIT * p[2]}, off=0.03)
             v = real_cradles.by_spheres(np.abs(p), 3, True)
             test = (real_cradles.misfits(lambda _, v=v: v, {3: data[3]}, (3,)) ** 2).sum()
             assert (gammaincc(2, test / 2) > 0.05) == (name == "narrow")
     assert fits["near", "wide"] < fits["near", "narrow"]
     assert fits["far", "narrow"] < fits["far", "wide"]
     wanted, error = float(GLUED["gap-wanted"]), float(GLUED["gap-wanted-error"])
-    assert abs(float(GLUED["jump-narrow"]) - wanted) < error
-    assert float(GLUED["jump-wide"]) - wanted > 5 * error
+    assert abs(float(TOLD["jump-narrow"]) - wanted) < error
+    assert float(TOLD["jump-wide"]) - wanted > 5 * error
 
 
 def test_a_softer_first_touch():
@@ -495,8 +521,8 @@ def test_strikers_one_by_one():
     show_as_arrows(stages, "fig-real-one-by-one")
 
 
-def show_as_arrows(stages, figure):
-    for ax, v in zip(CHAPTER.figures[figure].axes, stages, strict=True):
+def show_as_arrows(stages, figure, page=CHAPTER):
+    for ax, v in zip(page.figures[figure].axes, stages, strict=True):
         arrows = [(one.xy[0] - one.xyann[0]) for one in ax.texts if hasattr(one, "xyann")]
         drawn = [(length - 0.4 * np.sign(length)) / 0.5 for length in arrows]
         assert drawn == pytest.approx([speed for speed in v if abs(speed) > 0.02], abs=2e-3)
@@ -512,12 +538,12 @@ def struck_twice(between):
 
 def test_two_strikers_one_by_one():
     """The arrows, by the fitting script's spheres."""
-    show_as_arrows([[1, 1, 0, 0, 0], *struck_twice(real_cradles.APART)], "fig-real-two")
+    show_as_arrows([[1, 1, 0, 0, 0], *struck_twice(real_cradles.APART)], "fig-real-two", APPENDIX)
 
 
 def test_the_rebound_of_ball_1_against_the_distance_of_two_strikers():
     """It rises and falls, and is that of the film at two distances, which lie where gaps pass."""
-    ax, unit = CHAPTER.figures["fig-real-rebound"].axes[0], 1e3 * UNIT  # mm
+    ax, unit = APPENDIX.figures["fig-real-rebound"].axes[0], 1e3 * UNIT  # mm
     curve = next(line for line in ax.get_lines() if line.get_label() == "ball 1").get_xydata()
     for distance, rebound in curve[::20]:
         assert rebound == pytest.approx(-100 * struck_twice(distance / unit)[1][0], abs=5e-3)
@@ -525,7 +551,7 @@ def test_the_rebound_of_ball_1_against_the_distance_of_two_strikers():
     assert (np.diff(curve[: peak + 1, 1]) > 0).all()
     assert (np.diff(curve[peak:, 1]) < 1e-3).all()
     film, error = (100 * x[0] for x in first_strikes(4)[2])
-    near, far = (float(GLUED[f"rebound-{x}"]) for x in ("near", "far"))
+    near, far = (float(TOLD[f"rebound-{x}"]) for x in ("near", "far"))
     found = [np.interp(x, curve[:, 0], curve[:, 1]) for x in (near, far)]
     assert found == pytest.approx([-film] * 2, abs=0.1)
     assert near < curve[peak, 0] < far
@@ -614,7 +640,7 @@ def test_the_first_two_of_three_strikers_did_not_come_as_one():
     for v in (two, real_cradles.ratios([*p], e, 3, False)):
         off = real_cradles.misfits(lambda _, v=v: v, {3: (film, error)}, (3,))
         assert off @ off > 5 * sums_of("ratios")
-    least = float(GLUED["pair-um"]) * 1e-6 / UNIT
+    least = float(TOLD["pair-um"]) * 1e-6 / UNIT
     assert behind(least)[1] == pytest.approx(behind(30)[1] + 3.84, abs=0.3)
 
 
@@ -724,8 +750,8 @@ def test_what_the_third_strike_wants_of_ball_4():
         low, high = sorted(inside(near - least[name] - 1))
         error = scale * (high - low) / 2
         assert float(GLUED[f"{name}-wanted-error"]) == pytest.approx(error, abs=step)
-    CHAPTER.tells({"fall": 100 * (1 - wanted["ratio"] / ratios[2])}, off=0.05)
-    half = float(GLUED["fall-overlap"]) / float(GLUED["fall"])
+    APPENDIX.tells({"fall": 100 * (1 - wanted["ratio"] / ratios[2])}, off=0.05)
+    half = float(TOLD["fall-overlap"]) / float(TOLD["fall"])
     assert half == pytest.approx(0.5, abs=0.1)  # not as much
     # Either fits then; the gap did before.
     assert max(least.values()) < 6
@@ -762,8 +788,8 @@ def test_the_two_pushes_at_ball_4():
         release: 100 * np.minimum(first, second).sum() / first.sum()
         for release, (_, first, second) in found.items()
     }
-    CHAPTER.tells({"fall-overlap": 100 * (1 - shares[3] / shares[1])}, off=0.1)
-    above, below = CHAPTER.figures["fig-real-forces"].axes
+    APPENDIX.tells({"fall-overlap": 100 * (1 - shares[3] / shares[1])}, off=0.1)
+    above, below = APPENDIX.figures["fig-real-forces"].axes
     for ax, shown in ((above, (1,)), (below, (3, 1))):
         curves = [line.get_xydata() for line in ax.get_lines()]
         assert len(curves) == 2 * len(shown)
