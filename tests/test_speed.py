@@ -117,7 +117,7 @@ def test_what_is_cut_is_below_rounding():
     lossy = magnitudes(rng, 1, 20).tolist(), struck(20)[1], uniform(rng, 0.9, 1.0, 19), 0.15
     for chain in ((*struck(100), 1.0, 0.1), (*struck(100), 1.0, 0.45), lossy):
         stored = solve(*chain).velocities
-        for cut in (2.0**-100, 2.0**-200, 0.0):
+        for cut in (2.0**-100, 0.0):
             assert solve(*chain, cut=cut).velocities == stored, cut
         assert solve(*chain, cut=2.0**-30).velocities != stored
 
