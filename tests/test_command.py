@@ -503,6 +503,7 @@ def test_film_gives_the_rows_of_the_table(folder):
     (folder / "one.csv").write_text(call(line), encoding="utf-8")
     one = read_shots(folder / "one.csv")["BAC"]
     stored = read_shots(folder / "shots.csv")["BAC"]
+    assert one.masses == pytest.approx(stored.masses)
     np.testing.assert_allclose(one.after[0], stored.after[0], atol=1e-4)
     np.testing.assert_allclose(one.before[0], stored.before[0], atol=1e-4)
     np.testing.assert_allclose(one.sigma[0], stored.sigma[0], rtol=0.3)
