@@ -6,7 +6,8 @@ import sys
 
 import numpy as np
 import pytest
-from pages import PATIENCE
+from explorer import Tab
+from pages import PATIENCE, visiting
 
 import reader_solver  # isort: skip
 import solver_numpy  # isort: skip  (both are found by way of pyproject.toml)
@@ -100,23 +101,35 @@ class Editor:
         return tuple(self.host.locator(f"{place} .{kind}").count() for kind in kinds)
 
 
-@pytest.fixture
-def page(visit):
-    """Open the page, and the fold with the whole program; keep what it asks for."""
-    tab = visit(chapter="own_solver")
+@pytest.fixture(scope="module")
+def page(browser, idle, html):
+    """The page for all tests that do not ask how it begins: each has an editor of its own."""
+    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
+        yield with_whole(Tab(visit(chapter="own_solver")))
+
+
+def with_whole(tab):
+    """Open the fold with the whole program."""
     tab.locator(f".admonition:has({WHOLE}) .toggle-button").click()
-    tab.asked = []
-    tab.on("request", lambda request: tab.asked.append(request.url))
     return tab
 
 
-def test_right_wrong_and_endless(page, solver):
+def piece_of(name: str) -> str:
+    return f".reader-solver[data-piece={name}]"
+
+
+def test_right_wrong_and_endless(visit, solver):
     """Nothing is loaded before the click; what is right passes, the rest is told with its line."""
-    tab, editor = page, Editor(page)
-    assert not any("solver_python" in url for url in tab.asked)
-    assert editor.area.input_value() == solver
+    tab, asked = with_whole(visit(chapter="own_solver")), []
+    tab.on("request", lambda request: asked.append(request.url))
+    for piece, text in reader_solver.texts(reader_solver.cells()).items():
+        editor = Editor(tab, piece_of(piece) if piece else WHOLE)
+        assert editor.area.input_value() == text["own"]
+        assert editor.host.locator("ol").is_hidden()
+    editor = Editor(tab)
+    assert not any("solver_python" in url for url in asked)
     assert editor().told("5 of 5 checks passed") == (5, 0)
-    assert sum("solver_python" in url for url in tab.asked) == 1
+    assert sum("solver_python" in url for url in asked) == 1
     # Each wrong line is noticed by the checks that it concerns.
     for right, wrong, passed in (
         ("min(a, bound)", "a", 4),
@@ -178,7 +191,7 @@ def test_right_wrong_and_endless(page, solver):
     ],
 )
 def test_single_calls_tell_what_is_wrong(page, piece, right, wrong, missed, words):
-    editor = Editor(page, f".reader-solver[data-piece={piece}]")
+    editor = Editor(page, piece_of(piece))
     lines = "import numpy as np\n" + reader_solver.parts(reader_solver.cells())[piece]
     assert lines.count(right) == 1
     editor(lines.replace(right, wrong)).told("of 5 checks passed")
@@ -189,7 +202,7 @@ def test_single_calls_tell_what_is_wrong(page, piece, right, wrong, missed, word
 
 @pytest.mark.parametrize("kind", ["list", "tuple"])
 def test_lists_in_the_place_of_arrays(page, kind):
-    editor = Editor(page, ".reader-solver[data-piece=rates]")
+    editor = Editor(page, piece_of("rates"))
     lines = reader_solver.parts(reader_solver.cells())["rates"]
     lists = lines.replace("return push, np.array", f"return {kind}(push), {kind}")
     editor(f"import numpy as np\n{lists}").told("An error")
@@ -221,12 +234,11 @@ def test_a_browser_without_a_language(page):
 @pytest.mark.parametrize("piece", reader_solver.PIECES)
 def test_a_piece_by_itself(page, piece):
     """Empty, right, broken in the reader's lines, and wrong where only the page's lines notice."""
-    editor = Editor(page, f".reader-solver[data-piece={piece}]")
+    editor = Editor(page, piece_of(piece))
     right = reader_solver.parts(reader_solver.cells())[piece]
-    stub = editor.area.input_value()
+    stub = reader_solver.texts(reader_solver.cells())[piece]["own"]
     begin = 1 + stub[: stub.index("raise NotImplementedError")].count("\n")
-    assert editor.host.locator("ol").is_hidden()
-    assert editor().told(f"Write your lines at line {begin}.") == (0, 0)
+    assert editor(stub).told(f"Write your lines at line {begin}.") == (0, 0)
     assert editor.host.locator("ol").is_hidden()
     with_numpy = f"import numpy as np\n{right}"
     assert editor(with_numpy).told("5 of 5 checks passed") == (5, 0)
@@ -242,9 +254,7 @@ def test_a_piece_by_itself(page, piece):
 
 
 def test_each_editor_keeps_what_was_written(page):
-    one, other = (
-        Editor(page, f".reader-solver[data-piece={name}]") for name in ("rates", "three_balls")
-    )
+    one, other = (Editor(page, piece_of(name)) for name in ("rates", "three_balls"))
     before = other.area.input_value()
     one.area.fill("mine:")
     one.area.press("End")
