@@ -163,6 +163,7 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
     assert tab.state("view.number") > 1
 
 
+@pytest.mark.parametrize("answered", [True, False])
 @pytest.mark.parametrize(
     ("name", "setting", "said", "words"),
     [
@@ -172,7 +173,7 @@ def test_pictures_wait_after_a_hit_that_was_guessed(still):
         ("patterns", "speeds=1,0,0&forward=0.5", "none", "You said none; it is ball 1."),
     ],
 )
-def test_a_question_of_a_chapter(still, name, setting, said, words):
+def test_a_question_of_a_chapter(still, name, setting, said, words, answered):
     """The answer is the solver's; it is told after the balls have moved, to whoever let them go."""
     tab = still(chapter=name)
     asked = tab.locator(".cradle-explorer").first
@@ -188,18 +189,12 @@ def test_a_question_of_a_chapter(still, name, setting, said, words):
     assert tab.bars()[: len(before)] == before
     assert tab.state("covered")
     assert tab.inner_text(".question .told") == ""  # nothing is told before the hit
-    for answer in said, "":
-        if answer:
-            tab.choose(answer)
-        asked.get_by_role("button", name="Next hit", exact=True).click()
-        tab.drawn()
-        assert not tab.state("covered")
-        assert tab.inner_text(".question .told") == (words if answer else f"Answer: {told}.")
-        tab = still(chapter=name)  # and without an answer
-        asked = tab.locator(".cradle-explorer").first
-        if setting:
-            tab.act(f"read('{setting}')")
-        tab.drawn()
+    if answered:
+        tab.choose(said)
+    asked.get_by_role("button", name="Next hit", exact=True).click()
+    tab.drawn()
+    assert not tab.state("covered")
+    assert tab.inner_text(".question .told") == (words if answered else f"Answer: {told}.")
 
 
 def test_events_are_listed(still):

@@ -790,7 +790,7 @@ def test_what_rests_is_said_to_rest(still):
         ("n_balls", {"ratio"}),
     ],
 )
-def test_small_ones_in_chapters(visit, still, chapter: str, parts: set[str]):
+def test_small_ones_in_chapters(visit, chapter: str, parts: set[str]):
     """They wait to be let go, show what the chapter is about, and leave the address alone."""
     tab = visit(chapter=chapter, width=390, stopped=True)
     tab.clock.run_for(1000)
@@ -808,8 +808,12 @@ def test_small_ones_in_chapters(visit, still, chapter: str, parts: set[str]):
     assert after["forward"] != before["forward"]
     assert same_outcome(after)
     assert tab.evaluate("location.hash") == ""
-    link = host.locator(".more a").get_attribute("href")
-    assert still("#" + link.partition("#")[2]).drawn() == after
+    page, _, setting = host.locator(".more a").get_attribute("href").partition("#")
+    assert page == "explorer.html"
+    ratio.press("ArrowLeft")
+    assert tab.later(50) != after
+    tab.act(f"read('{setting}')")
+    assert tab.later(50) == after
 
 
 def test_the_first_page_does_what_it_says(visit):
