@@ -1,5 +1,6 @@
 """The page of observations: its verdicts by other routes, and its sources."""
 
+import functools
 import re
 from pathlib import Path
 
@@ -81,9 +82,10 @@ def test_the_lines_of_the_page_list_every_law_once():
 E = np.round(np.arange(0.71, 1, 0.02), 2)
 
 
+@functools.cache
 def lossy(e):
     """The loss that gives two spheres this restitution, by another integrator."""
-    return brentq(lambda a: np.ptp(spheres([1, 0], [0], a)) - e, 0, 0.4)
+    return brentq(lambda a: np.ptp(spheres([1, 0], [0], a)) - e, 0, 0.4, xtol=1e-7)
 
 
 def shown(name):
