@@ -276,17 +276,20 @@ def test_bands_of_the_ten_predictions():
         chain, _ = paper_chain(sequence)
         pairs = [sequence[i : i + 2] for i in range(len(sequence) - 1)]
         triplets = [sequence[i : i + 3] for i in range(len(sequence) - 2)]
+        # Entries of both tables, each under the name that it has wherever the chain uses it.
+        same = [("".join(sorted(xy)), table_1.loc[xy[0], xy[1]]) for xy in pairs]
+        ahead, back = (
+            [(t[::step], TABLE_2.ratio[t[::step]]) for t in triplets] for step in (1, -1)
+        )
         found = []
         for _ in range(1000):
-            off = {}  # of an entry, wherever the chain uses it
+            off = {}
 
             def entry(name, value, off=off):
                 return max(0, value + off.setdefault(name, uniform(rng, -0.01, 0.01)))
 
-            e = [min(1, entry("".join(sorted(xy)), table_1.loc[xy[0], xy[1]])) for xy in pairs]
-            forward, backward = (
-                [entry(t[::step], TABLE_2.ratio[t[::step]]) for t in triplets] for step in (1, -1)
-            )
+            e = [min(1, entry(*one)) for one in same]
+            forward, backward = ([entry(*one) for one in row] for row in (ahead, back))
             impact = textbook.solve(chain.masses, chain.velocities, e, forward, backward)
             found.append(np.array(impact.velocities, float))
         ends = 100 * np.quantile(found, [0.025, 0.975], axis=0)

@@ -1,5 +1,6 @@
 """Chapter "Measure your own cradle": what its text says, by second routes."""
 
+import functools
 import math
 import re
 
@@ -154,6 +155,7 @@ def test_the_left_out_set_by_another_integration():
     found = CHAPTER.printed("gaps-law") + CHAPTER.printed("gaps-found")
     stiffness = 4 / 3 * 210e9 / (2 * (1 - 0.3**2)) * math.sqrt(0.01109 / 2)
 
+    @functools.cache
     def struck(apart, gap, viscosity, speed):
         unit = (0.0448 * speed**2 / stiffness) ** 0.4
         gaps = [1e-6 * x / unit for x in (apart, apart, 0, gap)]  # ball 3 strikes wherever it is
