@@ -136,6 +136,20 @@ def visit(browser, idle, html: Path):
         yield lambda *given, **options: Tab(visit(*given, **options))
 
 
+@pytest.fixture(scope="module")
+def linked(browser, idle, html: Path):
+    """What follows a link on one page that tests share: those that look at a setting's answers."""
+    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
+        tab = Tab(visit(reduced_motion="reduce"))
+
+        def follow(fragment="scene=example"):
+            for address in ("speeds=0,0", fragment):  # the page hears of a change alone
+                tab.go_to(address)
+            return tab
+
+        yield follow
+
+
 @pytest.fixture
 def still(visit):
     """The same for a reader who asked for less motion: nothing moves by itself."""

@@ -30,12 +30,12 @@ def swung(setting, strokes: int):
     return swing(released, model, -chain.velocities / frequency, times, pendulums=hanging)
 
 
-def test_swing_of_the_page(still):
+def test_swing_of_the_page(linked):
     """Velocities after hits and positions between them are those of `cradle.swing`.
 
     Rounding differs, grows from hit to hit and may decide a tie: few hits, all balls in motion.
     """
-    tab = still()
+    tab = linked()
     for setting in settings(24):
         run = swung(setting, 3)
         hits, places = tab.evaluate(
@@ -100,9 +100,9 @@ def test_copied_python_gives_the_same_numbers(still):
     assert [line for line in tab.inner_text("details pre").splitlines() if line] == lines
 
 
-def test_paper_chains_by_their_letters(still):
+def test_paper_chains_by_their_letters(linked):
     """Letter by letter as a reader does it, and as a scene: Tables 1 and 2 of the paper."""
-    tab = still()
+    tab = linked()
     for sequence in paper_sequences():
         by_hand, scene = tab.evaluate(
             """(sequence) => {
@@ -216,9 +216,9 @@ def test_sliders_change_the_outcome(still):
         )
 
 
-def test_momentum_and_energy_add_up(still):
+def test_momentum_and_energy_add_up(linked):
     """Arrows from zero to the momentum before; shares of the energy named, and their sum."""
-    tab = still("#speeds=1,0,0,0,0&masses=1,2,1,1,3&forward=0.2&restitution=0.8")
+    tab = linked("speeds=1,0,0,0,0&masses=1,2,1,1,3&forward=0.2&restitution=0.8")
     setting = tab.drawn()
     masses, before, after = (np.array(setting[name]) for name in ("masses", "speeds", "after"))
     momentum, energy = tab.locator(".balance .plot").all()
@@ -242,9 +242,9 @@ def test_momentum_and_energy_add_up(still):
     assert f"ball {largest + 1}: {100 * shares[largest]:.0f}\u00a0%" in energy.inner_text()
 
 
-def test_energy_in_the_contacts(still):
+def test_energy_in_the_contacts(linked):
     """Within a hit, event by event: what Python says that the contacts can still give back."""
-    tab = still()
+    tab = linked()
     told = """(setting) => {
       const record = new cradleExplorer.Swing(setting).record(0);
       const along = cradleExplorer.progress(record ?? { pathImpulses: [] });
@@ -286,11 +286,10 @@ def test_energy_in_the_contacts(still):
         assert -1e-3 < lost.min() <= lost.max() < last + 1e-3
 
 
-def test_the_bar_of_energy_is_whole_within_a_hit(still):
+def test_the_bar_of_energy_is_whole_within_a_hit(linked):
     """What moves and what the contacts hold; afterwards nothing is in the contacts."""
-    tab = still("#speeds=1,0,0&forward=0.15")
     for restitution, lost in ((1, False), (0.5, True)):
-        tab.go_to(f"speeds=1,0,0&forward=0.15&restitution={restitution}")
+        tab = linked(f"speeds=1,0,0&forward=0.15&restitution={restitution}")
         tab.drawn()
         tab.act("view.part = 0.35")
         tab.drawn()
@@ -309,9 +308,8 @@ def test_the_bar_of_energy_is_whole_within_a_hit(still):
         assert tab.inner_text(".balance small").startswith("total")
 
 
-def test_a_ratio_above_its_bound_says_so(still):
+def test_a_ratio_above_its_bound_says_so(linked):
     """One ball strikes others at rest: what comes out is that of the bound."""
-    tab = still()
     for fragment, said in (
         ("speeds=1,0,0&forward=0.7", " (bound 0.5)"),
         ("speeds=1,0,0&forward=0.5", ""),
@@ -319,7 +317,7 @@ def test_a_ratio_above_its_bound_says_so(still):
         ("speeds=1,0,0,0&masses=1,2,0.5,1&forward=0.6&backward=0.1", None),
         ("scene=ABCCAB", None),
     ):
-        tab.go_to(fragment)
+        tab = linked(fragment)
         setting = tab.drawn()
         held = tab.evaluate(f"cradleExplorer.boundedRatios({SETTING})")
         same = collide(chain_of(setting)[0], ImpulseCorrelation(held["forward"], held["backward"]))

@@ -84,9 +84,9 @@ def test_wrong_addresses_are_refused(still):
     assert tab.drawn()["speeds"] == [1, 0]
 
 
-def test_letters_bring_their_numbers(still):
+def test_letters_bring_their_numbers(linked):
     """A link may name the paper's balls and nothing else; a ball of another mass has no letter."""
-    tab = still("#letters=ABACA")
+    tab = linked("letters=ABACA")
     found = tab.drawn()
     chain, model = paper_chain("ABACA", excess="saturate")
     asked = chain_of(found)
@@ -671,8 +671,8 @@ def test_map_is_the_solvers(still):
     assert tab.evaluate("document.activeElement.classList.contains('point')")
 
 
-def test_sweep_is_the_solvers(still):
-    tab = still("#scene=half")
+def test_sweep_is_the_solvers(linked):
+    tab = linked("scene=half")
     setting = tab.drawn()
     values = tab.evaluate(
         f"""() => {{
@@ -688,9 +688,9 @@ def test_sweep_is_the_solvers(still):
     np.testing.assert_allclose(values, python, rtol=0, atol=1e-12)
 
 
-def test_scenes_do_what_their_texts_say(still):
+def test_scenes_do_what_their_texts_say(linked):
     """In Python, from the settings that the page has."""
-    tab = still()
+    tab = linked()
     scenes = {scene["key"]: scene for scene in tab.evaluate("cradleExplorer.data.scenes")}
     traces = {key: collide(*chain_of(scene["setting"])) for key, scene in scenes.items()}
     after = {key: trace.velocities for key, trace in traces.items()}
@@ -755,24 +755,23 @@ def test_scenes_do_what_their_texts_say(still):
     np.testing.assert_allclose(np.abs(together["after"]), 0.2)
 
 
-def test_links_of_scenes(still, html):
+def test_links_of_scenes(linked, html):
     """They lead to a heading that is there."""
-    tab, linked = still("#scene=one"), set()
+    tab, named = linked(), set()
     for scene in tab.evaluate("cradleExplorer.data.scenes"):
-        tab.go_to(f"scene={scene['key']}")
-        tab.evaluate(FRAMES)
+        linked(f"scene={scene['key']}").evaluate(FRAMES)
         text = tab.locator(".scene-text")
         assert text.inner_text().startswith(scene["text"][:60])
         for link in text.locator("a").all():
             page, _, heading = link.get_attribute("href").partition("#")
             assert f'<section id="{heading}">' in (html / "book" / page).read_text("utf-8")
-            linked.add(scene["key"])
-    assert linked == {"one", "small"}
+            named.add(scene["key"])
+    assert named == {"one", "small"}
 
 
-def test_what_rests_is_said_to_rest(still):
+def test_what_rests_is_said_to_rest(linked):
     """In exact numbers balls 2 and 3 stand still, as the landing page says."""
-    tab = still("#scene=small")
+    tab = linked("scene=small")
     assert tab.drawn()["after"][1:3] == [0, 0]
     words = tab.inner_text(".words")
     assert "balls 2 and 3 rest and" in words
