@@ -78,6 +78,8 @@ def test_two_balls_and_what_is_said(two_balls):
     assert not fit.poor
     assert set(fit.widened.values()) == {1.0}
     assert fit.reading == pytest.approx(2e-4, rel=0.1)
+    freedom = places.size - 2 - 6  # a constant for each ball; four numbers, a place and a speed
+    assert fit.reading == pytest.approx(np.sqrt(np.square(fit.residuals).sum() / freedom))
     assert np.nanmax(np.abs(fit.residuals.mean(axis=0))) < 1e-12
     offset = places - fit.swing.positions - fit.residuals
     assert np.ptp(offset, axis=0).max() < 1e-12  # one number for each ball
