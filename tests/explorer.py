@@ -13,6 +13,12 @@ from cradle import Chain, ImpulseCorrelation, collide
 EXPLORER = "cradleExplorer.live[0]"
 SETTING = f"{EXPLORER}.state.setting"
 
+
+def disc(ball: int) -> str:
+    """The selector of a ball, counted from 0."""
+    return f".ball[data-ball='{ball}'] .disc"
+
+
 # A frame may change sizes and so ask for another one; sweeps and maps take many. With a swing in
 # motion there is no last one: see `Tab.later`.
 AT_REST = f"""async () => {{
@@ -99,6 +105,12 @@ class Tab:
         self.mouse.move(x + beside, y)
         self.mouse.down()
         return x, y
+
+    def drag(self, selector: str, x: float = 0.0, y: float = 0.0):
+        """Press the mouse on an element, move it so far, and let it go."""
+        left, top = self.grab(selector)
+        self.mouse.move(left + x, top + y, steps=4)
+        self.mouse.up()
 
     def bars(self, selector: str = ".outcome .drawn") -> list[float]:
         """Return the numbers that a picture of bars shows."""

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from explorer import EXPLORER, chain_of
+from explorer import EXPLORER, chain_of, disc
 
 from cradle import Chain, ImpulseCorrelation, SpringChain, collide
 
@@ -46,9 +46,7 @@ def test_the_first_page_is_guessed(still):
     tab.drawn()
     assert tab.state("view.guess.values") == pytest.approx(guess)
     tab.evaluate("matchMedia = () => ({ matches: false })")  # from here on a reader of all motion
-    x, y = tab.grab(".ball[data-ball='0'] .disc")
-    tab.mouse.move(x + 5, y, steps=4)
-    tab.mouse.up()
+    tab.drag(disc(0), 5)
     tab.drawn()
     tab.get_by_label("your guess for ball 5, m/s").press("ArrowLeft")
     assert tab.drawn()["speeds"][0] < 1

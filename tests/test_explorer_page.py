@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from explorer import SETTING, chain_of, same_outcome, settings
+from explorer import SETTING, chain_of, disc, same_outcome, settings
 from pages import colour, contrast, show
 
 from cradle import (
@@ -124,20 +124,20 @@ def test_a_ball_is_dragged_and_let_go(visit):
     tab.push("Pull back")
     tab.act(f"set(cradleExplorer.atRest({SETTING}))")
     tab.clock.run_for(50)
-    x, y = tab.grab(".ball[data-ball='4'] .disc")
+    x, y = tab.grab(disc(4))
     for step in range(1, 9):
         tab.mouse.move(x + 10 * step, y)
         tab.clock.run_for(16)
-    at, _ = tab.middle(".ball[data-ball='4'] .disc")
+    at, _ = tab.middle(disc(4))
     assert abs(at - (x + 80)) < 8
     tab.clock.run_for(1000)  # it waits in the hand
-    assert tab.middle(".ball[data-ball='4'] .disc")[0] == at
+    assert tab.middle(disc(4))[0] == at
     tab.mouse.up()
     assert same_outcome(tab.later(50))
     assert tab.inner_text("button.main") == "Pause"
     tab.clock.run_for(950)  # the hit comes after half a second
     assert tab.state("clock.time") == pytest.approx(1, abs=0.05)
-    first, second = (tab.middle(f".ball[data-ball='{ball}'] .disc")[0] for ball in (0, 1))
+    first, second = (tab.middle(disc(ball))[0] for ball in (0, 1))
     assert second - first > 60  # the hit has sent ball 1 to the left; at rest they touch
 
 
@@ -156,7 +156,7 @@ def test_pull_back_where_it_has_an_effect(visit):
 def test_only_a_drag_moves_a_ball(visit):
     """A tap on a ball leaves the swing as it is, and a ball taken at its edge does not jump."""
     tab = visit("#scene=one", stopped=True)
-    ball = ".ball[data-ball='4'] .disc"
+    ball = disc(4)
     tab.push("Let go", 1000)
     before = tab.state("clock.time")
     pulled(tab, ball, 1)
@@ -180,7 +180,7 @@ def pulled(tab, ball: str, way: int, from_edge: int = 0) -> float:
 
 def test_balls_in_the_way_come_along(still):
     tab = still("#scene=one")
-    x, y = tab.grab(".ball[data-ball='2'] .disc")
+    x, y = tab.grab(disc(2))
     tab.mouse.move(x - 60, y, steps=6)
     taken = tab.drawn()["speeds"]
     assert taken[0] == 1  # was pulled back further
@@ -403,9 +403,7 @@ def test_number_material_and_sweep(still):
     tab.click("label:has-text('Each ratio')")
     tab.drawn()
     assert tab.locator(".drags-x polyline").count() == 3
-    x, y = tab.grab(".drags-x svg")
-    tab.mouse.move(x + 30, y)
-    tab.mouse.up()
+    tab.drag(".drags-x svg", 30)
     moved = tab.drawn()
     assert moved["forward"] == moved["backward"] != setting["forward"]
     assert same_outcome(moved)

@@ -6,7 +6,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from explorer import EXPLORER, SETTING, chain_of, same_outcome, settings
+from explorer import EXPLORER, SETTING, chain_of, disc, same_outcome, settings
 from pages import FRAMES, MISFITS, colour, contrast, show
 
 from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
@@ -262,9 +262,7 @@ def take(tab, scene: str):
 
 def touch(tab, selector: str, way: int = 0):
     """Press the mouse on an element, move it to the side, and let it go."""
-    x, y = tab.grab(selector)
-    tab.mouse.move(x + way, y, steps=4)
-    tab.mouse.up()
+    tab.drag(selector, way)
     return tab.later(50)
 
 
@@ -303,8 +301,8 @@ def test_keys_of_a_lecture_after_the_mouse(still):
     done = {key: [scene, False, False] for key, scene in walks.items()}
     done |= {".": [False, True], "Space": [True, False]}
     pressed_before = {
-        ".ball[data-ball='0'] .disc": -30,
-        ".ball[data-ball='4'] .disc": 0,
+        disc(0): -30,
+        disc(4): 0,
         ".run button:has-text('Slow motion')": 0,
         ".settings input[type=range] >> nth=1": 20,
         ".settings label[title='ball 2']": 0,
@@ -325,7 +323,7 @@ def test_keys_of_a_lecture_after_tab(still):
     """In full screen a ball that Tab has reached keeps the arrows, and a button the space bar."""
     tab = full_screen(still)
     take(tab, "two")
-    touch(tab, ".ball[data-ball='4'] .disc", 30)
+    touch(tab, disc(4), 30)
     take(tab, "two")
     tab_to(tab, "pull of ball 1")
     for key, speed in (("ArrowLeft", 1.1), ("ArrowRight", 1)):
@@ -356,7 +354,7 @@ def test_keys_of_a_lecture_on_the_page(still):
     tab.click(".words")
     pressed(tab, ("ArrowRight", "small", False, False), ("ArrowLeft", "two", False, False))
     tab.later(50)
-    touch(tab, ".ball[data-ball='4'] .disc")
+    touch(tab, disc(4))
     pressed(
         tab, (".", "two", False, True), ("Space", "two", True, True), ("Space", "two", False, True)
     )
@@ -654,9 +652,7 @@ def test_map_is_the_solvers(still):
     assert len(np.unique(expected)) == 3
 
     # Drag the point to where the first ball bounces back, by pointer and by key.
-    x, y = tab.grab(".point .present")
-    tab.mouse.move(x + 20, y - 60, steps=4)
-    tab.mouse.up()
+    tab.drag(".point .present", 20, -60)
     moved = tab.drawn()
     assert moved["masses"][0] < 1
     assert moved["masses"][1] == 1
@@ -822,9 +818,7 @@ def test_the_first_page_does_what_it_says(visit):
     tab.push("Let go")
     assert tab.later(1000)["speeds"] == [1, 0, 0, 0, 0]
     tab.get_by_label("ratio", exact=True).press("Home")
-    x, y = tab.grab(".ball[data-ball='1'] .disc")
-    tab.mouse.move(x - 60, y - 10, steps=4)
-    tab.mouse.up()
+    tab.drag(disc(1), -60, -10)
     shown = tab.later(50)
     assert shown["speeds"][0] == shown["speeds"][1] > 0.5
     assert shown["speeds"][2:] == [0, 0, 0]

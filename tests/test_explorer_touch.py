@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from explorer import EXPLORER, SETTING, same_outcome
+from explorer import EXPLORER, SETTING, disc, same_outcome
 
 
 class Hand:
@@ -39,15 +39,11 @@ def phones(still):
     return lambda fragment="": still(fragment, width=390, has_touch=True, is_mobile=True)
 
 
-def ball(number: int) -> str:
-    return f".ball[data-ball='{number}'] .disc"
-
-
 def test_two_fingers_pull_two_balls(phone):
     """Each follows its own finger, and one that is let go stays where it was pulled to."""
     tab = phone("#speeds=0,0,0,0,0&forward=0.1")
     tab.drawn()
-    hand, (left, y), (right, _) = Hand(tab), tab.middle(ball(0)), tab.middle(ball(4))
+    hand, (left, y), (right, _) = Hand(tab), tab.middle(disc(0)), tab.middle(disc(4))
     hand.down(1, (left, y))
     hand.move(1, -60, 0)
     first = tab.drawn()["speeds"]
@@ -75,7 +71,7 @@ def test_two_fingers_pull_two_balls(phone):
 def test_a_ball_follows_the_finger_as_the_mouse(still, phone):
     """The page does not scroll under it."""
     mouse, tab = still("#scene=one", width=390), phone("#scene=one")
-    x, y = mouse.grab(ball(4))
+    x, y = mouse.grab(disc(4))
     mouse.mouse.move(x + 80, y, steps=20)
     by_mouse = mouse.drawn()["speeds"][4]
     assert by_mouse < -0.5
@@ -84,9 +80,9 @@ def test_a_ball_follows_the_finger_as_the_mouse(still, phone):
         "document.querySelector('.stage')"
         ".addEventListener('pointercancel', () => (globalThis.lost = true))"
     )
-    show_middle(tab, ball(4))
+    show_middle(tab, disc(4))
     scrolled, hand = tab.evaluate("scrollY"), Hand(tab)
-    hand.down(1, tab.middle(ball(4)))
+    hand.down(1, tab.middle(disc(4)))
     hand.move(1, 80, 0, steps=20)
     shown = tab.drawn()
     hand.up(1)
@@ -143,8 +139,8 @@ def test_a_finger_takes_the_nearest_ball(phone):
     """Where places to touch overlap."""
     tab = phone("#speeds=0,0,0,0,0,0,0")
     tab.drawn()
-    show_middle(tab, ball(3))
-    hand, (x, y) = Hand(tab), tab.middle(ball(3))
+    show_middle(tab, disc(3))
+    hand, (x, y) = Hand(tab), tab.middle(disc(3))
     hand.down(1, (x + 6, y))
     hand.move(1, -60, 0)
     assert np.sign(tab.drawn()["speeds"]).tolist() == [1, 1, 1, 1, 0, 0, 0]
@@ -153,7 +149,7 @@ def test_a_finger_takes_the_nearest_ball(phone):
 def test_a_second_finger_on_the_same_ball_is_none(phone):
     tab = phone("#speeds=0,0,0,0,0&forward=0.1")
     tab.drawn()
-    hand, (x, y) = Hand(tab), tab.middle(ball(0))
+    hand, (x, y) = Hand(tab), tab.middle(disc(0))
     hand.down(1, (x - 3, y))
     hand.down(2, (x + 3, y))
     hand.move(2, -60, 0)
@@ -168,7 +164,7 @@ def show_middle(tab, place: str):
     )
 
 
-@pytest.mark.parametrize("place", [".drags-x svg", ".map svg", ball(3)])
+@pytest.mark.parametrize("place", [".drags-x svg", ".map svg", disc(3)])
 def test_scrolling_past_a_picture_changes_nothing(phone, place):
     """Up or down, with the slant of a thumb: the page scrolls and the experiment stays."""
     tab = phone("#scene=map&picture=map" if "map" in place else "#scene=half")
@@ -208,7 +204,7 @@ def test_a_tap_and_a_finger_to_the_side_do_their_work(phone, place, row):
 def test_another_setting_while_a_ball_is_held(still):
     """Typed, or followed as a link: balls that are gone are let go, the others stay in the hand."""
     tab = still("#scene=one")
-    x, y = tab.grab(ball(4))
+    x, y = tab.grab(disc(4))
     tab.mouse.move(x + 40, y, steps=4)
     held = tab.drawn()["speeds"]
     assert held[4] < 0
