@@ -13,11 +13,11 @@ from truth import solve
 
 from cradle import viscosity_from
 
-CHAPTER = Chapter("forces")
+CHAPTER, METHOD = Chapter("forces"), Chapter("forces_method")
 
 
 def test_zeta_is_hurwitzs():
-    cells = code("forces")
+    cells = code("forces_method")
     last = next(k for k, cell in enumerate(cells) if "def zeta" in cell.source)
     with in_memory(plt.close):
         zeta = run(cells[: last + 1], {})["zeta"]
@@ -28,7 +28,7 @@ def test_zeta_is_hurwitzs():
 
 def test_fig_kink():
     """Below: Hurwitz's zeta, from mpmath. Above: bars and curve, whose areas differ by it."""
-    above, below = CHAPTER.figures["fig-own-forces-kink"].axes
+    above, below = METHOD.figures["fig-own-forces-kink"].axes
     _, curve, dot = (line.get_xydata() for line in below.get_lines())
     (theta, marked), (at, off) = dot[0], curve.T
     assert off == pytest.approx([float(mpmath.zeta(-1.5, x)) for x in [1, *at[1:]]], abs=1e-6)
@@ -44,29 +44,29 @@ def test_fig_kink():
 
 
 def test_the_curves_have_their_orders():
-    shown = panel("forces", "fig-own-forces")
+    shown = panel("forces_method", "fig-own-forces")
     for label, order, name in zip(
         shown, (2, 2.5, 3.5), ("verlet", "better", "corrected"), strict=True
     ):
         work, error = np.log(shown[label]).T
         assert -np.polyfit(work, error, 1)[0] == pytest.approx(order, abs=0.25)
         assert float(label.split()[-1]) == pytest.approx(order, abs=0.25)
-        assert name == "verlet" or label.endswith(f": {CHAPTER.glued[name]}")
+        assert name == "verlet" or label.endswith(f": {METHOD.glued[name]}")
 
 
 def test_the_work_for_an_error():
-    shown = list(panel("forces", "fig-own-forces").values())
+    shown = list(panel("forces_method", "fig-own-forces").values())
     for name, curve in zip(("verlet", "better", "corrected"), shown, strict=True):
         points = curve.tolist()
         while points[-1][1] <= 1e-3:
             work, within = points.pop()
         more, beyond = points[-1]
         work *= (more / work) ** (np.log(1e-3 / within) / np.log(beyond / within))
-        assert CHAPTER.glued[f"{name}-work"] == f"{work:.0f}"
+        assert METHOD.glued[f"{name}-work"] == f"{work:.0f}"
     # Each ring is where its number says, on the line of a thousandth.
-    (ax,) = CHAPTER.figures["fig-own-forces"].axes
+    (ax,) = METHOD.figures["fig-own-forces"].axes
     rings = [ring.get_offsets()[0].tolist() for ring in ax.collections]
-    three = [CHAPTER.glued[f"{name}-work"] for name in ("verlet", "better", "corrected")]
+    three = [METHOD.glued[f"{name}-work"] for name in ("verlet", "better", "corrected")]
     assert rings == [[float(work), 1e-3] for work in three]
     assert {*three} < {text.get_text() for text in ax.texts}
 
@@ -99,7 +99,7 @@ def test_fig_cost():
 
 
 def test_the_error_of_the_last_ball():
-    lines = CHAPTER.printed("forces-use").splitlines()
+    lines = METHOD.printed("forces-use").splitlines()
     for line in lines:
         last, error = (line.split(word)[1].split(",")[0] for word in ("last ball ", "error "))
         off = abs(float(last) - HERTZ["five equal"][-1])
@@ -124,7 +124,7 @@ def test_the_rule_is_per_cents_from_spheres():
     off = np.abs(np.array(done.velocities, float) - HERTZ["five equal"]).max()
     (line,) = [
         line.get_ydata()[0]
-        for line in CHAPTER.figures["fig-own-forces"].axes[0].get_lines()
+        for line in METHOD.figures["fig-own-forces"].axes[0].get_lines()
         if line.get_linestyle() == "--"
     ]
     assert line == pytest.approx(off, abs=1e-8)

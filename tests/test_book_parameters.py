@@ -35,6 +35,7 @@ CHANGES = {
     "toy": [{"ratio": 0.05, "pulled_back": 0.02}, {"ratio": 0.3}],
     "engines": [{"step": 1 / 240}, {"step": 1e-4}],
     "forces": [{"masses": [1, 2, 1]}],
+    "forces_method": [{"masses": [1, 2, 1]}],
     "laws": [{"ratio": 0}, {"ratio": 0.4}],
     "extremes": [{"ratio": 0}, {"ratio": 0.3}],
     "table_2": [

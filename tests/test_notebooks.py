@@ -183,6 +183,7 @@ GIVEN = {
     "measure": "0.3 0.35 0.5 0.7 1.4 1.5 3.84",
     "table_2": "0.001 0.01 0.129 0.215 0.22 0.390 0.462 0.710 0.755 0.782",
     "forces": "0.5 0.9",  # what laws of loss are set to
+    "forces_method": "",
     "trade": "",
     "engines": "",
     "laws": "0.5",
