@@ -51,8 +51,8 @@ def settled(slow, low, high, s):
 def push(p, a, d, move, early):
     """Return force and slope of a contact: once open, none until it closes or its losses push."""
     if d > 0.0 and (move > 0.0 if a.f == 0.0 and early < 1.0 else d + early * move > 0.0):
-        g = a.k * grade(p, d)
-        return g * d, p * g
+        g = grade(p, d)
+        return a.k * d * g, p * a.k * g
     return 0.0, 0.0
 
 
@@ -62,9 +62,8 @@ def step(p, h, low, high, s):
     The force of a contact waits for that of the next, the kick of a ball for the forces of both.
     """
     part = h * h / 12.0
-    kinks = 0
+    kinks, here = 0, s[low].v
     top = force = steep = gain = given = 0.0
-    here = s[low].v
     for c in range(low, high):
         a = s[c]
         there = s[c + 1].v
@@ -79,15 +78,15 @@ def step(p, h, low, high, s):
         f -= a.pull
         dv = (force - f) * a.w
         if c > low:
-            kick = force + part * steep * (gain - dv)
-            s[c - 1].v += h * (given - kick) * s[c - 1].w
-            given = kick
+            b, more = s[c - 1], part * steep * (gain - dv)
+            b.v = b.v + h * gain + h * b.w * (given - more)
+            given = more
         top = max(top, (steep + g) * a.w)
         force, steep, gain, here = f, g, dv, there
-    last = s[high]
-    kick = force + part * steep * (gain - force * last.w)
-    s[high - 1].v += h * (given - kick) * s[high - 1].w
-    last.v += h * kick * last.w
+    b, last = s[high - 1], s[high]
+    more = part * steep * (gain - force * last.w)
+    b.v = b.v + h * gain + h * b.w * (given - more)
+    last.v += h * last.w * (force + more)
     return kinks, max(top, steep * last.w)
 
 
@@ -189,8 +188,7 @@ def fly(h, low, high, s):
 def begin(n, p, hunt, s, clock, record):
     """Go back to the start; there the sums owe h^2/12 times the rates of forces."""
     clock.low, clock.high, clock.steps, clock.row = n, 0, 0, 0
-    clock.top = clock.time = 0.0
-    clock.stiff = 1.0
+    clock.top, clock.time, clock.stiff = 0.0, 0.0, 1.0
     for i in range(n):
         a = s[i]
         a.v, a.d, a.y = a.start, a.lean, a.lean
@@ -309,8 +307,7 @@ def run(n, law, effort, s, clock, record):
                 put_down(n, s, clock, record)
             continue
         clock.steps += 1
-        clock.time += h
-        time = clock.time
+        clock.time = time = clock.time + h
         left, right = s[low].v, s[high].v
         if lossy:
             kinks, stiff = drift_lossy(p, law.hunt, h, low, high, s)
@@ -329,7 +326,7 @@ def run(n, law, effort, s, clock, record):
             low -= 1
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if kinks > 0:
-            pay(n, p, h, kinks, slow, lossy, clock.steps == 1, s)
+            pay(p, h, kinks, slow, lossy, clock.steps == 1, s)
         if lossy:
             kick_lossy(h, low, high, s)
         ended = parted(n, slow, s, clock) if leans else settled(slow, low, high, s)
