@@ -5,7 +5,6 @@ A refusal names the value, its place and the rule: `masses[1] = -1.0; must be ab
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NewType, TypeVar
 
 import numpy as np
@@ -35,14 +34,15 @@ def numbers(name: str, values: ArrayLike | None, at: tuple[int, ...] = ()) -> Ve
     if type(values) is np.ndarray and values.dtype == np.float64:
         return values
     given: Any = values
-    with suppress(OverflowError, TypeError, ValueError):
-        if isinstance(values, (list, tuple)):
-            if _usual(values):
-                return np.array(values, dtype=np.float64)
-        elif not _is_masked(values):
+    try:
+        if _usual([values]):
+            return np.array(values, dtype=np.float64)
+        if not (isinstance(values, (list, tuple)) or _is_masked(values)):
             given = np.asarray(values)
             if given.dtype.kind in "iuf" and given.itemsize <= 8:  # long doubles go further
                 return np.array(given, dtype=np.float64)
+    except (OverflowError, TypeError, ValueError):
+        given = values
     if not (isinstance(given, (list, tuple)) or (isinstance(given, np.ndarray) and given.ndim)):
         return np.array(_as_float(name, at, given[()] if type(values) is np.ndarray else values))
     # One by one, each as it was given.

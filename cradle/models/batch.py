@@ -123,8 +123,8 @@ def outcomes(
                 f, b, meeting=meeting, excess="saturate", max_events=max_events
             )
             fail(model, Chain(m, v, e), np.unravel_index(failed, lead))
-    v, hits, collapsed, margin = (x.reshape((*lead, *x.shape[1:])) for x in whole[:4])
-    return Outcomes(v, hits, collapsed != 0, margin)
+    v, hits, collapsed, margin = [x.reshape(lead + x.shape[1:]) for x in whole[:4]]
+    return Outcomes(v, hits, collapsed.astype(bool), margin)
 
 
 def fail(model: Any, chain: Chain, place: Sequence[Any]) -> NoReturn:
@@ -151,7 +151,7 @@ def shaped(
     for k, name in enumerate(given):
         size = n - missing[k]
         if arrays[k].ndim == 0:
-            arrays[k] = np.full(size, arrays[k])
+            arrays[k] = arrays[k].repeat(size)
         elif arrays[k].shape[-1] != size:
             rule = f"must be () or (..., {size}) for {n} balls"
             raise ValueError(f"{name} has shape {arrays[k].shape}; {rule}")
