@@ -32,12 +32,10 @@ _TERMS: Vector = np.asarray(np.linalg.inv(chebyshev.chebvander(_NODES, 14)))
 
 def first_fall(level: float, waves: list[Wave], parting: bool, horizon: float) -> float:
     """Return when ``level + sum Re(C exp(rate t))`` falls to zero; parting, it starts there."""
-    waves = [(c, rate) for c, rate in waves if c != 0.0]
-    if not waves:
-        return math.inf
-    if len(waves) > 1:
-        return _search(level, waves, parting, horizon)
-    ((c, rate),) = waves
+    moving = [wave for wave in waves if wave[0]]
+    if len(moving) != 1:
+        return _search(level, moving, parting, horizon) if moving else math.inf
+    c, rate = moving[0]
     if parting:
         c = complex(-level, -abs(c.imag))
     if level == 0.0 or rate.real == 0.0:
@@ -149,9 +147,11 @@ class SmallAngleFlight:
         closing = [c for c in met if not self.together[c]]
         return first, closing, [c for c in met if self.together[c] and times[c] == first]
 
-    def turning(self, duration: float) -> Vector:
-        """Return where each ball first turns, or is after that time, shape (N,)."""
+    def turning(self, duration: float, reach: Vector) -> Vector:
+        """Return where each ball first turns, or is after that time; more, if all is in reach."""
         rate, wave = self.rate, self.amplitude
+        if not np.count_nonzero((most := abs(self.centre) + abs(wave)) > reach):
+            return most
         wait = (0.5 * np.pi - np.angle(rate * wave)) % np.pi / rate.imag
         return np.asarray(self.centre + (wave * np.exp(rate * np.minimum(wait, duration))).real)
 

@@ -80,7 +80,7 @@ class Pendulums:
 
 def mean(values: Vector, masses: Vector) -> float:
     """Return the mean over the mass; equal values stay what they are, to the bit."""
-    return float(values[0] if (values == values[0]).all() else masses @ values / masses.sum())
+    return float(values[0] if len({*values.tolist()}) == 1 else masses @ values / masses.sum())
 
 
 class Hanging:

@@ -26,9 +26,9 @@ NEAR = 1e-12
 
 def stretches(contacts: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first ball of each stretch of marked contacts, and the one after its last."""
-    marked = np.concatenate([[False], contacts, [False]])
-    edges = np.flatnonzero(marked[1:] != marked[:-1])
-    return [(first, end + 1) for first, end in edges.reshape(-1, 2).tolist()]
+    marked = [False, *contacts.tolist(), False]
+    edges = [c for c in range(len(marked) - 1) if marked[c] != marked[c + 1]]
+    return [(first, end + 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def common_velocities(
@@ -38,7 +38,7 @@ def common_velocities(
     v, resting = velocities.copy(), np.zeros(len(touching), dtype=bool)
     while True:
         found = resting | (touching & (v[1:] - v[:-1] <= least))
-        if (found == resting).all():
+        if not np.count_nonzero(found != resting):
             return v, resting
         # The common velocity may be as slow against the next ball: look again.
         resting = found

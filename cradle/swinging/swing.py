@@ -135,7 +135,7 @@ class _Run:
             flight = kind(hanging, self.x, self.v, self.together, self.parting)
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
             if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
-                far = (1.0 - INSTANT) * flight.turning(min(wait, left))
+                far = (1.0 - INSTANT) * flight.turning(min(wait, left), hanging.reach)
                 hanging.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
@@ -181,7 +181,7 @@ class _Run:
         kept = touching & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
-        if resting.any():
+        if np.count_nonzero(resting):
             alone = hanging.accelerations(self.x, self.v)
             resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
         self.together = tuple(resting.tolist())
