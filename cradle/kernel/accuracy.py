@@ -136,7 +136,7 @@ def aim(n, law, s, clock):
     accuracy, spread = law.accuracy, max(0.0, 1.5 - law.p)
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
-    clock.eta = math.sqrt(math.sqrt(part)) if part > 0.039 else (1.5 * part) ** (1.0 / 3.5)
+    clock.eta = min(part**0.25, (1.5 * part) ** (1.0 / 3.5))
     eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
