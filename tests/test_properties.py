@@ -57,7 +57,7 @@ def outcome(chain, forward, backward, meeting, limit=20_000):
         return None
 
 
-@settings(max_examples=200)
+@settings(max_examples=400)
 @given(impacts())
 def test_momentum_energy_order_and_ledger(impact):
     """In exact arithmetic, as far as rounding allows."""
@@ -72,6 +72,7 @@ powers = st.tuples(st.integers(-40, 40), st.integers(-40, 40)) | st.tuples(
 )
 
 
+@settings(max_examples=200)
 @given(impacts(), powers)
 def test_units_that_are_powers_of_two_change_no_bit(impact, powers):
     (chain, *ratios), (speeds, masses) = impact, powers
