@@ -112,24 +112,20 @@ STOPS = """[...document.querySelectorAll('mjx-container[tabindex], mjx-container
 # Misfits that no change of the window may mend.
 AS_IT_CAME = "equation", "no sign of more"
 
-# Each page has it from its first moment.
-STILL = """
-  const still = new CSSStyleSheet();
-  still.replaceSync("*, *::before { transition: none !important; animation: none !important; }");
-  document.adoptedStyleSheets = [still];
-"""
+STILL = "*, *::before { transition: none !important; animation: none !important; }"
 FOUND = "/found \\d+ page/.test(document.body.innerText)"
 
 
 def looked_at(tab, page: Path, views) -> dict[str, list]:
     """Open a page; list its faults by kind, and the numbers of its equations on phones."""
-    tab.evaluate("document.documentElement.hidden = true")  # the page before: no need to lay it out
+    tab.goto("about:blank")
     shape(tab, SMALLEST, "light")
     searched = page.stem == "search"
     tab.goto(page.as_uri() + ("?q=restitution" if searched else ""))
     if searched:
         tab.wait_for_function(FOUND)
         assert tab.locator("#search-results li").count() > 10
+    tab.add_style_tag(content=STILL)
     tab.evaluate(ALL_SET)
     tab.evaluate(FRAMES)
     wide = tab.evaluate("document.scrollingElement.scrollWidth")
@@ -170,7 +166,6 @@ def seen(request, html: Path, browser):
     )
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
-    tab.add_init_script(STILL)
     said, found = listened(tab), {}
     for page in [*sorted((html / "book").glob("*.html")), *sorted(html.glob("*.html"))]:
         if page.name != "index.html":  # leads to the first page
