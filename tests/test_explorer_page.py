@@ -26,7 +26,7 @@ def swung(setting, strokes: int):
     hanging = Pendulums(length=1.0)
     frequency = hanging.natural_frequency(len(chain))
     released = Chain(chain.masses, np.zeros(len(chain)), chain.restitution)
-    times = (0.7 + np.arange(strokes)) * np.pi / frequency[0]
+    times = np.append(0.2, 0.7 + np.arange(strokes)) * np.pi / frequency[0]  # hits: 0.5, 1.5, ...
     return swing(released, model, -chain.velocities / frequency, times, pendulums=hanging)
 
 
