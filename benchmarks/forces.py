@@ -83,7 +83,8 @@ def fitted(masses):
 def rule(masses, loss, ratios):
     rows, n = masses.shape
     left, right = spring_velocities([1, 1], [1, 0], viscosity=loss, accuracy=1e-6)
-    given = masses, struck(rows, n), min(right - left, 1.0), *ratios
+    e = right - left if loss else 1.0  # elastic spheres to all digits
+    given = masses, struck(rows, n), e, *ratios
     return partial(post_impact_velocities, *given, excess="saturate")
 
 
