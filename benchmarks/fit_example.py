@@ -1,17 +1,29 @@
-"""A synthetic experiment with hanging balls, as a phone would film it: files for the example.
+"""Synthetic experiments with hanging balls, as a phone would film them: files for the examples.
 
-Writes `data/video_synthetic.txt` and `data/shots_synthetic.csv` in seconds.
-The balls follow the pendulum's own equation of motion, the impact the values of Tables 1 and 2;
+Writes four files of `data/` in seconds.
+`row_synthetic.csv`: a row of five equal steel balls with narrow gaps, one to three lifted.
+`swing_synthetic.txt`: six seconds of a swing of five balls with wide gaps.
+`video_synthetic.txt` and `shots_synthetic.csv`: balls of three kinds.
+The last ones follow the pendulum's own equation of motion, the impact the values of Tables 1 and 2;
 velocities are found from the marks, each a random amount off, as a reader would find them.
 """
 
 from functools import partial
 
 import numpy as np
-from scipy.special import ellipj
+from scipy.special import ellipj, ndtri
 from stored import options, write
 
-from cradle import collide, paper_chain
+import cradle
+from cradle import (
+    Chain,
+    Pendulums,
+    SequentialCollisions,
+    SpringChain,
+    collide,
+    hertz_stiffness,
+    paper_chain,
+)
 from cradle.fit import Tracks, velocities_from_tracks
 from cradle.fit.tracks import Track
 
@@ -23,6 +35,13 @@ DIAMETER = 0.035
 SPEEDS = (0.6, 1.0, 1.4)
 #: Sets of the experiment and how many shots of each there are at every speed.
 SETS = {"AB": 4, "AC": 4, "ABA": 4, "BAC": 4, "CAB": 4, "ACA": 4, "ABACA": 2}
+# The row, with the law of the book that fits it.
+ROW_SPEEDS = (0.35, 0.35, 0.7, 0.7, 1.4, 1.4)
+RADIUS, MASS, ERROR = 0.01109, 0.0448, 0.0009  # m, kg, m/s
+ROW_GAPS, APART, VISCOSITY = (3e-6, 1.5e-6, 0.5e-6), 600e-6, 2e-7  # m; m, of strikers; s
+# The swing.
+PERIOD, DAMPING, RESTITUTION, SWING_GAPS = 0.8, 0.02, 0.985, 8e-5  # s, 1/s, -, m
+SWING_SCATTER = 0.0003  # of a mark, m
 HEADER = "set shot ball type mass before after sigma sigma_before"
 
 
@@ -82,9 +101,40 @@ def experiment():
     return rows, text
 
 
+def row_of(lifted):
+    """Return the rows of the table of one set of the row; how fast the strikers came is exact."""
+    gaps = np.array([APART, *ROW_GAPS])
+    gaps[1 : lifted - 1] = APART
+    law = SpringChain(hertz_stiffness([RADIUS] * 5), gaps=gaps, viscosity=VISCOSITY, accuracy=1e-6)
+    before = np.outer(ROW_SPEEDS, np.arange(5) < lifted)
+    off = ERROR * ndtri(np.random.default_rng(lifted).random(before.shape))
+    after = off + [collide(Chain([MASS] * 5, v), law).velocities for v in before]
+    return [
+        [f"{lifted} lifted", shot + 1, k + 1, "A", MASS, f"{before[shot, k]:g}",
+         f"{after[shot, k]:.5f}", ERROR, 0]
+        for shot, k in np.ndindex(before.shape)
+    ]  # fmt: skip
+
+
+def film_of_a_swing():
+    """Return what Tracker would export of a row that is let go, and swings."""
+    moments = np.arange(0, 6, 1 / 30)
+    strings = GRAVITY * (PERIOD / (2 * np.pi)) ** 2
+    run = cradle.swing(
+        Chain([1] * 5, [0] * 5, RESTITUTION), SequentialCollisions(), [-0.03, 0, 0, 0, 0], moments,
+        pendulums=Pendulums(strings, damping=DAMPING, gaps=SWING_GAPS),
+    )  # fmt: skip
+    moved = np.random.default_rng(1).normal(0, SWING_SCATTER, run.positions.shape)
+    places = run.positions + moved + 2 * RADIUS * np.arange(5)
+    return export({name: Track(moments, x) for name, x in zip("ABCDE", places.T)})
+
+
 if __name__ == "__main__":
     folder = options(__doc__).parse_args().output
     rows, text = experiment()
     (folder / "video_synthetic.txt").write_text(text, encoding="utf-8")
     comment = "# SYNTHETIC: made by benchmarks/fit_example.py, not measured\n"
     write("shots_synthetic.csv", HEADER, rows, folder, comment)
+    rows = [row for lifted in (1, 2, 3) for row in row_of(lifted)]
+    write("row_synthetic.csv", HEADER, rows, folder, comment)
+    (folder / "swing_synthetic.txt").write_text(film_of_a_swing(), encoding="utf-8")

@@ -13,10 +13,8 @@ from cradle.tables import paper_chain
 
 STRUCK = [1, 0, 0, 0, 0]
 #: The cells of the page that its figures need; its fits of laws and swings take longer.
-MEASURE = (
-    "setup", "fig-setup", "phone", "track-call", "fig-tracks", "choose", "sets", "show-pairs",
-    "show-ratios", "fig-fit",
-)  # fmt: skip
+MEASURE = ("setup", "fig-setup", "phone", "track-call", "fig-tracks")
+RATIOS = ("setup", "choose", "show-pairs", "show-ratios", "fig-fit")
 
 
 def velocities(chain, forward, backward=None):
@@ -107,7 +105,7 @@ def test_fig_measure_tracks():
     ],
 )
 def test_likelihoods_cross_their_limit_at_the_printed_ends(figure, printed):
-    ax = drawn("measure", MEASURE)[figure].axes[0]
+    ax = drawn("measure_ratios", RATIOS)[figure].axes[0]
     x, y = ax.get_lines()[0].get_xydata().T
     assert y.min() == pytest.approx(0, abs=1e-3)
     above = y > 3.84

@@ -1,4 +1,4 @@
-"""Chapter "Measure your own cradle": what its text says, by second routes."""
+"""Chapter "Measure your own cradle" and its page on ratios: their text, by second routes."""
 
 import functools
 import math
@@ -17,13 +17,13 @@ from truth import solve
 from cradle.closed_form import one_collision_each, three_balls
 from cradle.fit import read_shots
 
-CHAPTER, TABLE = Chapter("measure"), Chapter("table_2")
+CHAPTER, RATIOS, TABLE = map(Chapter, ("measure", "measure_ratios", "table_2"))
 GLUED = CHAPTER.glued | TABLE.glued
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
-    for name in ("fig-tracks", "fig-fit"):
-        caption = CHAPTER.cells[name].metadata.mystnb.figure.caption
+    for page, name in ((CHAPTER, "fig-tracks"), (RATIOS, "fig-fit")):
+        caption = page.cells[name].metadata.mystnb.figure.caption
         assert "synthetic" in caption.lower(), name
 
 
@@ -105,7 +105,7 @@ def test_frames_of_the_laboratory():
 
 def test_prediction_of_a_longer_row():
     """The medians by the independent solver, and the shots beside them."""
-    found = CHAPTER.printed("show-pairs") + CHAPTER.printed("show-ratios")
+    found = RATIOS.printed("show-pairs") + RATIOS.printed("show-ratios")
     told = {name: float(x) for name, x in re.findall(r"(?m)^\w+ (\w+) = ([\d.]+)", found)}
     rows = read("shots_synthetic.csv", set="ABACA")
     columns = ("mass", "before", "after", "sigma", "sigma_before")
@@ -117,14 +117,14 @@ def test_prediction_of_a_longer_row():
         [told[name] for name in way] for way in (["ABA", "BAC", "ACA"], ["ABA", "CAB", "ACA"])
     ]
     done = solve(mass[0].tolist(), [1.0, 0, 0, 0, 0], losses, *ratios, number=float)
-    printed = [line.split() for line in CHAPTER.printed("check").splitlines()[2:7]]
+    printed = [line.split() for line in RATIOS.printed("check").splitlines()[2:7]]
     median, low, high = floats(x for line in printed for x in line[2:]).reshape(5, 3).T
     assert floats(done.velocities) == pytest.approx(median, abs=1.5e-3)
     assert ((low < median) & (median < high)).all()
     speed = before[:, :1]
     error = np.hypot(sigma, speed * (high - low) / 3.92)
     off = (after - speed * median) / np.hypot(error, median * sigma_before[:, :1])
-    said = re.findall(r"\d+", CHAPTER.printed("check-how"))
+    said = re.findall(r"\d+", RATIOS.printed("check-how"))
     assert [int(x) for x in said] == pytest.approx([np.square(off).sum(), off.size], abs=4.5)
 
 
@@ -168,22 +168,22 @@ def test_the_left_out_set_by_another_integration():
     film = noise + [struck(600, 0.5, 200, speed) for speed in speeds]
     numbers = [float(x) for x in re.findall(r"(?:apart|gap_45|viscosity) = ([\d.]+)", found)]
     judged = {
-        law: (*map(int, sums), verdict)
-        for law, *sums, verdict in re.findall(
-            r"(?m)^ *(\S.*?) +(\d+) / (\d+) +(\d+) / (\d+) +(yes|no)$", found
+        law: (float(fit) * (free := 60 - int(count)), free, float(test) * 30, verdict)
+        for law, count, fit, test, verdict in re.findall(
+            r"(?m)^ *(\S.*?) +(\d) +([\d.]+) +([\d.]+) +(yes|no)$", found
         )
     }
     for law, three in (("gaps", numbers[:3]), ("touching spheres", [900, 0, 180])):
-        *_, told, free, _ = judged[law]
+        *_, told, _ = judged[law]
         off = (film - [struck(*three, speed) for speed in speeds]) / sigma
         # Of touching spheres the page prints no numbers: none is near enough.
         right = law == "gaps"
         assert (off**2).sum() == pytest.approx(told, rel=0.02 if right else 0.3)
-        assert free == off.size
+        assert off.size == 30
     # The others miss both: far above what a right law has by chance.
     assert len(judged) == 5
-    for law, (fit, n, test, free, verdict) in judged.items():
-        passes = gammaincc(n / 2, fit / 2) > 0.05 and gammaincc(free / 2, test / 2) > 0.05
+    for law, (fit, n, test, verdict) in judged.items():
+        passes = gammaincc(n / 2, fit / 2) > 0.05 and gammaincc(30 / 2, test / 2) > 0.05
         assert (verdict == "yes") == passes == (law == "gaps")
     # Ratios see of the same film balls 3, 4 and 5 only; then balls 2 and 1 follow, pair by pair.
     lossy, tried = 0.985, np.linspace(0.05, 0.25, 81)
@@ -207,7 +207,7 @@ def test_the_left_out_set_by_another_integration():
     ]
     one, four = float(GLUED["ratio-one"]), float(GLUED["ratio-four"])
     for ratio, law in ((one, "one ratio"), (four, "a ratio each")):
-        *_, told, _, _ = judged[law]
+        *_, told, _ = judged[law]
         rounded = np.abs(tried - ratio) < 0.006
         ends = np.array(off)[rounded]
         assert 0.97 * ends.min() < told < 1.03 * ends.max(), law
@@ -232,8 +232,8 @@ def test_at_ratios_below_that_of_bac_the_first_two_balls_collide_twice():
 
 def test_the_commands_of_the_page_run_one_after_the_other(tmp_path, monkeypatch):
     """Films make tables; to the second the shots of the page are added, and all is fitted."""
-    blocks = re.findall(r"(?s)```text\n(.*?)```", CHAPTER.cells["commands"].source)
-    lines = "".join(blocks).splitlines()
+    told = (page.cells["commands"].source for page in (CHAPTER, RATIOS))
+    lines = "".join(re.findall(r"(?s)```text\n(.*?)```", "\n".join(told))).splitlines()
     monkeypatch.chdir(tmp_path)
     film = (DATA / "video_synthetic.txt").read_text(encoding="utf-8")
     (tmp_path / "bac.txt").write_text(film, encoding="utf-8")

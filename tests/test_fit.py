@@ -793,6 +793,22 @@ def test_synthetic_example_is_what_the_script_makes(monkeypatch):
                                    [float(x) for x in line[5:7]], atol=2e-4)  # fmt: skip
 
 
+def test_synthetic_row_and_swing_are_what_the_script_makes():
+    rows = [row for lifted in (1, 2, 3) for row in fit_example.row_of(lifted)]
+    comment, header, *lines = (DATA / "row_synthetic.csv").read_text(encoding="utf-8").splitlines()
+    assert comment.startswith("# SYNTHETIC")
+    assert header == ",".join(fit_example.HEADER.split())
+    for made, line in zip(rows, lines, strict=True):
+        *stored, after, sigma, sigma_before = line.split(",")
+        assert [str(x) for x in (*made[:6], *made[7:])] == [*stored, sigma, sigma_before]
+        assert float(made[6]) == pytest.approx(float(after), abs=1.1e-5)
+    stored = (DATA / "swing_synthetic.txt").read_text(encoding="utf-8").splitlines()
+    made = fit_example.film_of_a_swing().splitlines()
+    assert made[:3] == stored[:3]
+    places = (np.loadtxt(text, skiprows=3, encoding="utf-8") for text in (made, stored))
+    np.testing.assert_allclose(*places, rtol=0, atol=1.1e-5)
+
+
 def test_example_ends_in_the_values_it_was_made_with():
     shots = read_shots(DATA / "shots_synthetic.csv")
     squares, count = shots.momentum_check()

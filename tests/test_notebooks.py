@@ -102,6 +102,8 @@ def test_few_cells_escape_comparison():
         "multiple_impacts",
         "patterns",
         "n_balls",
+        "measure_ratios",
+        pytest.param("measure", marks=pytest.mark.exhaustive),  # its fit takes seconds
     ],
 )
 def test_shown_cells_can_be_typed_in(chapter: str):
@@ -180,7 +182,8 @@ GIVEN = {
     "real_cradles": "0.01 0.1 0.2 0.4 25.3",  # errors, distances, frames
     "recipe": "",
     "scene": "0.1 0.97",  # a step, and a restitution of the run
-    "measure": "0.3 0.35 0.5 0.7 1.4 1.5 3.84",
+    "measure": "0.3 0.35 0.5 0.7 1.4 1.5",
+    "measure_ratios": "3.84",
     "table_2": "0.001 0.01 0.129 0.215 0.22 0.390 0.462 0.710 0.755 0.782",
     "forces": "0.5 0.9",  # what laws of loss are set to
     "forces_method": "",
