@@ -147,8 +147,9 @@ class Job:
         room, old = min(wanted, self.room), self.state.record
         if len(self.outputs.p):  # of one chain whose path the caller keeps; others need none
             record = _record(room, self.n)
-            for part, written in zip(record, old, strict=True) if len(old.kinds) else ():
-                part[: len(written)] = written
+            if len(old.kinds):
+                for part, written in zip(record, old, strict=True):
+                    part[: len(written)] = written
             self.state = rooms.State(*self.state[:-1], record)
         self.counts["room"] = _ENDLESS if room == self.room else room - _ROUND * self.n
 

@@ -147,11 +147,13 @@ class SmallAngleFlight:
         closing = [c for c in met if not self.together[c]]
         return first, closing, [c for c in met if self.together[c] and times[c] == first]
 
-    def turning(self, duration: float, reach: Vector) -> Vector:
-        """Return where each ball first turns, or is after that time; more, if all is in reach."""
+    def may_leave(self, reach: Vector) -> bool:
+        """Tell whether a ball may ever be farther aside than this."""
+        return bool((abs(self.centre) + abs(self.amplitude) > reach).any())
+
+    def turning(self, duration: float) -> Vector:
+        """Return where each ball first turns, or is after that time, shape (N,)."""
         rate, wave = self.rate, self.amplitude
-        if not np.count_nonzero((most := abs(self.centre) + abs(wave)) > reach):
-            return most
         wait = (0.5 * np.pi - np.angle(rate * wave)) % np.pi / rate.imag
         return np.asarray(self.centre + (wave * np.exp(rate * np.minimum(wait, duration))).real)
 

@@ -134,8 +134,9 @@ class _Run:
         while len(self.impacts) < most:
             flight = kind(hanging, self.x, self.v, self.together, self.parting)
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
-            if isinstance(flight, SmallAngleFlight):  # others are certified not to go over the top
-                far = (1.0 - INSTANT) * flight.turning(min(wait, left), hanging.reach)
+            # Others are certified not to go over the top.
+            if isinstance(flight, SmallAngleFlight) and flight.may_leave(hanging.reach):
+                far = (1.0 - INSTANT) * flight.turning(min(wait, left))
                 hanging.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
