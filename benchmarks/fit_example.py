@@ -1,7 +1,8 @@
 """Synthetic experiments with hanging balls, as a phone would film them: files for the examples.
 
-Writes four files of `data/` in seconds.
+Writes five files of `data/` in seconds.
 `row_synthetic.csv`: a row of five equal steel balls with narrow gaps, one to three lifted.
+`row_film_synthetic.txt`: a film of this row, one ball lifted.
 `swing_synthetic.txt`: six seconds of a swing of five balls with wide gaps.
 `video_synthetic.txt` and `shots_synthetic.csv`: balls of three kinds.
 The last ones follow the pendulum's own equation of motion, the impact the values of Tables 1 and 2;
@@ -101,14 +102,33 @@ def experiment():
     return rows, text
 
 
-def row_of(lifted):
-    """Return the rows of the table of one set of the row; how fast the strikers came is exact."""
+def row_struck(before, lifted):
+    """Return what the row does by its law."""
     gaps = np.array([APART, *ROW_GAPS])
     gaps[1 : lifted - 1] = APART
     law = SpringChain(hertz_stiffness([RADIUS] * 5), gaps=gaps, viscosity=VISCOSITY, accuracy=1e-6)
+    return collide(Chain([MASS] * 5, before), law).velocities
+
+
+def film_of_the_row(speed=0.7):
+    """Return what Tracker would export of a shot of the row, a quarter of a swing each way."""
+    before = speed * np.eye(5)[0]
+    count = int(np.pi / 2 * np.sqrt(LENGTH / GRAVITY) * FRAMES_PER_SECOND)
+    moments = (np.arange(-count, count + 1) + 0.3) / FRAMES_PER_SECOND
+    after = row_struck(before, 1)
+    ways = [np.where(moments < 0, swing(v, moments), swing(w, moments))
+            for v, w in zip(before, after, strict=True)]  # fmt: skip
+    off = SCATTER * ndtri(np.random.default_rng(7).random((5, moments.size)))
+    places = np.array(ways) + off + 2 * RADIUS * np.arange(5)[:, None]
+    times = moments - moments[0]
+    return export({f"{k}": Track(times, x) for k, x in enumerate(places, 1)})
+
+
+def row_of(lifted):
+    """Return the rows of the table of one set of the row; how fast the strikers came is exact."""
     before = np.outer(ROW_SPEEDS, np.arange(5) < lifted)
     off = ERROR * ndtri(np.random.default_rng(lifted).random(before.shape))
-    after = off + [collide(Chain([MASS] * 5, v), law).velocities for v in before]
+    after = off + [row_struck(v, lifted) for v in before]
     return [
         [f"{lifted} lifted", shot + 1, k + 1, "A", MASS, f"{before[shot, k]:g}",
          f"{after[shot, k]:.5f}", ERROR, 0]
@@ -137,4 +157,5 @@ if __name__ == "__main__":
     write("shots_synthetic.csv", HEADER, rows, folder, comment)
     rows = [row for lifted in (1, 2, 3) for row in row_of(lifted)]
     write("row_synthetic.csv", HEADER, rows, folder, comment)
+    (folder / "row_film_synthetic.txt").write_text(film_of_the_row(), encoding="utf-8")
     (folder / "swing_synthetic.txt").write_text(film_of_a_swing(), encoding="utf-8")

@@ -1,6 +1,7 @@
 """Every curve of the chapters on the toy and on measuring, against a second route."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -87,15 +88,29 @@ def test_fig_measure_setup():
 
 
 def test_fig_measure_tracks():
-    shown = lines(drawn("measure", MEASURE)["fig-measure-tracks"].axes[0])
-    table = np.loadtxt(DATA / "video_synthetic.txt", skiprows=3, encoding="utf-8")
-    for name, x in zip("BAC", table[:, 1::2].T, strict=True):
+    ax = drawn("measure", MEASURE)["fig-measure-tracks"].axes[0]
+    shown = lines(ax)
+    table = np.loadtxt(DATA / "row_film_synthetic.txt", skiprows=3, encoding="utf-8")
+    for name, x in zip("12345", table[:, 1::2].T, strict=True):
         line = shown[f"ball {name}"]
         np.testing.assert_allclose(line[:, 1], 1000 * x, rtol=1e-12)
         np.testing.assert_allclose(np.diff(line[:, 0]), 1000 * np.diff(table[:, 0]), rtol=1e-9)
     # The struck balls begin to move at time zero.
-    time, moved = shown["ball C"].T
+    time, moved = shown["ball 5"].T
     assert moved[time < 0].max() < moved[time > 20].min()
+    # The slopes drawn are those of the marks near the impact, and what is written beside them.
+    told = [float(re.search(r"slope ([\d.]+)", x.get_text())[1]) for x in ax.texts[:2]]
+    for name, slope, side in zip(("ball 1", "ball 5"), told, (-1, 1), strict=True):
+        time, place = shown[name].T
+        near = (side * time > 0) & (side * time < 60)
+        assert np.polyfit(time[near], place[near], 1)[0] == pytest.approx(slope, rel=0.03)
+        straight = [x.get_xydata() for x in ax.lines if len(x.get_xydata()) == 2]
+        (drawn_slope,) = {
+            round((y1 - y0) / (x1 - x0), 2)
+            for (x0, y0), (x1, y1) in straight
+            if x0 == 0 and x1 * side > 0
+        }
+        assert drawn_slope == slope
 
 
 @pytest.mark.parametrize(

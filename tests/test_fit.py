@@ -802,11 +802,16 @@ def test_synthetic_row_and_swing_are_what_the_script_makes():
         *stored, after, sigma, sigma_before = line.split(",")
         assert [str(x) for x in (*made[:6], *made[7:])] == [*stored, sigma, sigma_before]
         assert float(made[6]) == pytest.approx(float(after), abs=1.1e-5)
-    stored = (DATA / "swing_synthetic.txt").read_text(encoding="utf-8").splitlines()
-    made = fit_example.film_of_a_swing().splitlines()
-    assert made[:3] == stored[:3]
-    places = (np.loadtxt(text, skiprows=3, encoding="utf-8") for text in (made, stored))
-    np.testing.assert_allclose(*places, rtol=0, atol=1.1e-5)
+    films = {
+        "swing_synthetic.txt": fit_example.film_of_a_swing,
+        "row_film_synthetic.txt": fit_example.film_of_the_row,
+    }
+    for name, film in films.items():
+        stored = (DATA / name).read_text(encoding="utf-8").splitlines()
+        made = film().splitlines()
+        assert made[:3] == stored[:3]
+        places = (np.loadtxt(text, skiprows=3, encoding="utf-8") for text in (made, stored))
+        np.testing.assert_allclose(*places, rtol=0, atol=1.1e-5)
 
 
 def test_example_ends_in_the_values_it_was_made_with():
