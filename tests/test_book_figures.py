@@ -27,7 +27,7 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 #: Drawings without numbers, what moves (tested by its cell), and names that tests put together.
 OTHERS = {
     *("fig-p1", "fig-p2", "fig-p9", "fig-own-notation-chain", "fig-own-notation-ratio"),
-    *("fig-own-multiple-rules", "fig-own-solver-phases"),
+    "fig-own-solver-phases",
     *("fig-flight", "fig-recipe-film", "fig-toy-film"),
     *("fig-p10", "fig-p11", "fig-p12"),
 }

@@ -285,6 +285,31 @@ def test_works_are_areas(chapter, figure, chain, ratio):
         assert orange == pytest.approx(chain[2] ** 2 * blue, rel=1e-9)
 
 
+def test_work_given_back_with_a_bend():
+    """Contact 1-2 from its second maximum on: both areas are e^2 times what it absorbed."""
+    path, impulses = solved(([1] * 3, [1, 0.8, 0], 0.25), 0.15)
+    u, tau = path[:, 0] - path[:, 1], impulses[:, 0]
+    shown = panel("multiple_impacts", "fig-own-multiple-back")
+    (top,) = np.flatnonzero(abs(tau - shown["$u_2$"][0, 0]) < 1e-12)
+    line = np.column_stack([tau, u])[top : top + 3]
+    np.testing.assert_allclose(shown["$u_2$"], line, **CLOSE)
+    (_, _), (x, height), (end, low) = line
+    triangle, trapezium = height**2 / 4, -(height + low) * (end - x) / 2
+    ends = np.flatnonzero(tau == tau[1:][np.diff(tau) == 0][0])[-1]  # of the first collision
+    step = (u[1:] + u[:-1]) / 2 * np.diff(tau)
+    absorbed = step[ends:top].sum()
+    assert triangle + trapezium == pytest.approx(0.25**2 * absorbed, rel=1e-9)
+    (_, start), (_, stop) = shown["slope 2, extended"]
+    assert start - stop == pytest.approx(2 * (end - x))
+    assert (height - low) / (end - x) == pytest.approx(2 - 0.15)
+    told = Chapter("multiple_impacts").cells["event-5"].outputs[0].data["text/latex"]
+    printed = [float(number) for number in re.findall(r"\d\.\d+", told)]
+    top_speed, base, _, work, bend, _, sigma = printed
+    assert work == pytest.approx(absorbed, abs=6e-5)
+    assert [top_speed, base] == pytest.approx([u[top - 1], tau[top - 1] - tau[ends]], abs=6e-4)
+    assert [bend, sigma] == pytest.approx([-height, end - x], abs=6e-5)
+
+
 def test_fig_area_of_the_toy():
     """Contact 2-3 of five balls, its line extended back to what ball 2 gains; as much orange."""
     path, impulses = solved(([1] * 5, [1, 0, 0, 0, 0], 1), 0.15)
