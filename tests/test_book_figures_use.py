@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 import pytest
-from chapters import drawn, floats, lines
-from stored import DATA
+from chapters import Chapter, drawn, floats, lines
+from stored import DATA, read
 from test_book_toy import strokes
 from truth import solve
 
@@ -15,7 +15,16 @@ from cradle.tables import paper_chain
 STRUCK = [1, 0, 0, 0, 0]
 #: The cells of the page that its figures need; its fits of laws and swings take longer.
 MEASURE = ("setup", "fig-setup", "phone", "track-call", "fig-tracks")
-RATIOS = ("setup", "choose", "show-pairs", "show-ratios", "fig-fit")
+RATIOS = (
+    "setup",
+    "choose",
+    "show-pairs",
+    "show-ratios",
+    "fig-fit",
+    "check",
+    "check-how",
+    "fig-check",
+)
 
 
 def velocities(chain, forward, backward=None):
@@ -127,6 +136,26 @@ def test_likelihoods_cross_their_limit_at_the_printed_ends(figure, printed):
     k = np.flatnonzero(above[1:] != above[:-1])
     ends = x[k] + (3.84 - y[k]) / (y[k + 1] - y[k]) * (x[k + 1] - x[k])
     np.testing.assert_allclose(ends, printed, rtol=0, atol=2e-4)
+
+
+def test_fig_measure_check():
+    """Bars as printed; dots and their errors from the table of shots."""
+    ax = drawn("measure_ratios", RATIOS)["fig-measure-check"].axes[0]
+    printed = Chapter("measure_ratios").printed("check").splitlines()[2:7]
+    low, high = np.transpose([line.split()[3:5] for line in printed]).astype(float)
+    np.testing.assert_allclose([bar.get_y() for bar in ax.patches], low, atol=5.1e-4)
+    tops = [bar.get_y() + bar.get_height() for bar in ax.patches]
+    np.testing.assert_allclose(tops, high, atol=5.1e-4)
+    rows = read("shots_synthetic.csv", set="ABACA")
+    before, after, sigma = (
+        floats(row[name] for row in rows).reshape(-1, 5) for name in ("before", "after", "sigma")
+    )
+    speed = before[:, :1]
+    for k, (dots, _, (bars,)) in enumerate(ax.containers[1:]):
+        np.testing.assert_allclose(dots.get_ydata(), (after / speed)[:, k], rtol=1e-12)
+        heights = [np.ptp(one[:, 1]) for one in bars.get_segments()]
+        np.testing.assert_allclose(heights, (2 * sigma / speed)[:, k], rtol=1e-9)
+    assert len(ax.containers) == 6
 
 
 def test_fig_measure_fold():

@@ -22,7 +22,7 @@ GLUED = CHAPTER.glued | TABLE.glued
 
 
 def test_every_page_that_shows_data_calls_them_synthetic():
-    for page, name in ((CHAPTER, "fig-tracks"), (RATIOS, "fig-fit")):
+    for page, name in ((CHAPTER, "fig-tracks"), (RATIOS, "fig-fit"), (RATIOS, "fig-check")):
         caption = page.cells[name].metadata.mystnb.figure.caption
         assert "synthetic" in caption.lower(), name
 
