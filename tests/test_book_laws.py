@@ -1,5 +1,7 @@
 """What the text of book/laws.ipynb says, by second routes."""
 
+import re
+
 import convex
 import numpy as np
 import pytest
@@ -30,29 +32,48 @@ def rigid(ratio, restitution=1):
     return floats(solve([1, 1, 1], [1, 0, 0], restitution, ratio).velocities)
 
 
+#: Velocities by other routes, in the order of the table.
+ANSWERS = {
+    "pairs": sequential("three equal"),
+    "ratio 0.1325": rigid(0.132503287),
+    "energy law, spheres": HERTZ["three equal"],
+    "energy law, linear springs": LINEAR["three equal"],
+    "convex dissipation": fused("three equal"),
+}
+
+
+def test_the_table_of_outcomes():
+    """In the table, and in their order on the arc; those of the first four are near pairs."""
+    (output,) = CHAPTER.cells["laws-outcomes"].outputs
+    rows = re.findall(r"<tr>(.*?)</tr>", output.data["text/html"], flags=re.S)
+    rows = [re.findall(r"<td>(.*?)</td>", row) for row in rows]
+    told = {name: v for name, *v in filter(None, rows)}
+    assert list(told) == list(ANSWERS)
+    for name, v in ANSWERS.items():
+        assert told[name] == [f"{x:z.2f}" for x in v], name
+    at = [angle("three equal", v) for v in ANSWERS.values()]
+    np.testing.assert_allclose(np.diff(at).clip(max=0), 0, atol=1e-4)
+    assert at[-1] == pytest.approx(60, abs=1e-6)
+    assert max(at[:4]) < 15  # near pairs
+
+
 def test_fig_laws_paths_ends_on_the_arc():
     """Every end: its impulses from velocities by other routes, and on the curve without losses."""
-    upper, lower = CHAPTER.figures["fig-laws-paths"].axes
-    for axis in (upper, lower):
-        x, y = axis.get_lines()[0].get_xydata().T
-        np.testing.assert_allclose((1 - x) ** 2 + (x - y) ** 2 + y**2, 1, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(x**2 - x * y + y**2, x, rtol=0, atol=1e-12)
-        np.testing.assert_allclose([x[0], y[0]], [1, 1], rtol=0, atol=1e-7)
-        np.testing.assert_allclose([x[-1], y[-1]], [4 / 3, 2 / 3], rtol=0, atol=1e-7)
-    answers = {"pairs": sequential("three equal"), "convex, one body": fused("three equal")}
-    answers |= {"energy law, spheres": HERTZ["three equal"], "ratio AAA": rigid(0.167)}
-    answers |= {"energy law, linear springs": LINEAR["three equal"]}
-    drawn = {line.get_label(): line.get_xydata()[0] for line in lower.get_lines()
+    (ax,) = CHAPTER.figures["fig-laws-paths"].axes
+    x, y = ax.get_lines()[0].get_xydata().T
+    np.testing.assert_allclose((1 - x) ** 2 + (x - y) ** 2 + y**2, 1, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(x**2 - x * y + y**2, x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose([x[0], y[0]], [1, 1], rtol=0, atol=1e-7)
+    np.testing.assert_allclose([x[-1], y[-1]], [4 / 3, 2 / 3], rtol=0, atol=1e-7)
+    drawn = {line.get_label(): line.get_xydata()[0] for line in ax.get_lines()
              if line.get_marker() != "None"}  # fmt: skip
-    assert drawn.keys() == answers.keys() == {text.get_text() for text in lower.texts}
-    for text in lower.texts:  # each leader ends at its mark
-        np.testing.assert_allclose(text.xy, drawn[text.get_text()], rtol=0, atol=1e-12)
-    for name, v in answers.items():
-        np.testing.assert_allclose(drawn[name], [1 - v[0], v[2]], rtol=0, atol=2e-5)
-    order = sorted(answers, key=lambda name: angle("three equal", answers[name]))
-    assert order == list(drawn)
-    assert angle("three equal", fused("three equal")) == pytest.approx(60, abs=1e-6)
-    assert all(angle("three equal", answers[name]) < 15 for name in order[:4])  # near pairs
+    assert list(drawn) == ["pairs", "spheres", "convex dissipation"]
+    names = "pairs", "energy law, spheres", "convex dissipation"
+    for end, name in zip(drawn.values(), names, strict=True):
+        v = ANSWERS[name]
+        np.testing.assert_allclose(end, [1 - v[0], v[2]], rtol=0, atol=2e-5)
+    (leader,) = (text for text in ax.texts if text.get_text() == "convex\ndissipation")
+    assert np.linalg.norm(leader.xy - drawn["convex dissipation"]) < 0.03
 
 
 def test_engines_on_the_arc():
@@ -149,8 +170,9 @@ def test_springs_do_not_explain_the_ratio_of_three_balls_a():
 
 
 def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
-    upper = CHAPTER.figures["fig-laws-paths"].axes[0]
-    ways = {line.get_label(): line.get_xydata() for line in upper.get_lines()}
+    (ax,) = CHAPTER.figures["fig-laws-paths"].axes
+    lines = [line for line in ax.get_lines() if line.get_marker() == "None"]
+    ways = {line.get_label(): line.get_xydata() for line in lines}
     assert ways["pairs"][[0, -1]].tolist() == [[0, 0], [1, 1]]
     assert [1, 0] in ways["pairs"].tolist()
     outcomes = {}
@@ -163,7 +185,9 @@ def test_fig_laws_paths_of_the_energy_law_and_of_the_ratio():
             np.testing.assert_allclose(path[-1], by_time[-1], rtol=0, atol=1e-3)
             assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() < 0.06  # smooth
     np.testing.assert_allclose(outcomes[1.0], HERTZ["three equal"], rtol=0, atol=1e-3)
-    ratio, path = 0.132503287, ways["ratio"]
+    (line,) = CHAPTER.cells["laws-ratio"].source.splitlines()
+    ratio, path = float(re.search(r"^ratio = (\S+)", line)[1]), ways["ratio"]
+    assert ratio == pytest.approx(0.132503287, abs=5e-6)
     v = rigid(ratio)
     end = [1 - v[0], v[2]]
     np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-7)
