@@ -39,8 +39,8 @@ def test_fig_toy_models():
     shown = [[lines(ax)[f"ball {k}"] for k in range(1, 6)] for ax in axes]
     assert all(line[:3, 0].tolist() == [1, 3, 5] for panel in shown for line in panel)
     # With losses the impacts end before the minute does.
-    sequential, ratio, lossy = np.array([[line[:20, 1] for line in panel] for panel in shown])
-    for drawn_by, e, a in ((sequential, 1, 0), (ratio, 1, 0.15), (lossy, 0.9, 0.15)):
+    ratio, lossy = np.array([[line[:20, 1] for line in panel] for panel in shown])
+    for drawn_by, e, a in ((ratio, 1, 0.15), (lossy, 0.9, 0.15)):
         expected = strokes(20, STRUCK, e, a)[::2].T
         np.testing.assert_allclose(drawn_by[:, :10], expected, rtol=0, atol=1e-9)
 
