@@ -96,10 +96,10 @@ def test_rows_of_linear_springs_by_their_modes():
 
 
 def test_fig_beyond_front():
-    """Above: the closed form for any length; below: a leader that slows down with every ball."""
-    upper, lower = CHAPTER.figures["fig-beyond-front"].axes
+    """The closed form at the far end of a long row."""
+    (ax,) = CHAPTER.figures["fig-beyond-front"].axes
     drawn = {k: [] for k in range(3)}
-    for number_of, line in enumerate(points(upper)):  # three of marks, two of the formula
+    for number_of, line in enumerate(points(ax)):  # three of marks, two of the formula
         drawn[number_of % 3].append(line)
     assert [len(lines) for lines in drawn.values()] == [2, 2, 1]
     for k, line in ((k, line) for k, lines in drawn.items() for line in lines):
@@ -107,9 +107,14 @@ def test_fig_beyond_front():
         # Near 1/2 the root is steep.
         np.testing.assert_allclose(line[:-1, 1], expected[:-1], rtol=0, atol=1e-12)
         assert line[-1, 1] == pytest.approx(expected[-1], abs=1e-7)
+
+
+def test_fig_beyond_leader():
+    """A leader that slows down with every ball."""
+    (ax,) = CHAPTER.figures["fig-beyond-leader"].axes
     lengths = np.array([10, 20, 40, 80, 160])
-    written = dict(text.get_text().split(": q = ") for text in lower.texts)
-    lines = points(lower)
+    written = dict(text.get_text().split(": q = ") for text in ax.texts)
+    lines = points(ax)
     assert len(written) == 3
     assert len(lines) == 6
     for ratio, fitted, marks in zip((0, 0.3, 0.45), lines[::2], lines[1::2]):
@@ -159,7 +164,7 @@ def test_fig_beyond_stability():
         for place, (length, kept) in enumerate(column(rows, "balls", "kept")):
             mark = next(written)
             assert mark.get_position() == (place, k)
-            assert float(mark.get_text()) == kept
+            assert mark.get_text() == ("all" if kept == length else f"{kept:g}")
             assert float(digits.get_xticklabels()[place].get_text()) == length
     for e in (0.9, 0.99, 0.999):
         # At ratio zero, Newton's rule for two balls, from ball to ball.
