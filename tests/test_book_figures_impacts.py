@@ -81,7 +81,8 @@ def eq_44(r2, e=0.5, a=0.15):
 
 
 def test_fig_6_drawn():
-    ax, enlarged = drawn("patterns")["fig-p6"].axes
+    (ax,) = drawn("patterns")["fig-p6"].axes
+    (enlarged,) = drawn("patterns")["fig-patterns-below"].axes
     shown = lines(ax)
     r2, r1 = shown["Eq. (44): back impact"].T
     np.testing.assert_allclose(r1, eq_44(r2), rtol=1e-13)
@@ -90,11 +91,11 @@ def test_fig_6_drawn():
     np.testing.assert_allclose(shown["Eq. (46): $v_2^+ = 0$"], [(rest_2, 1.7), (rest_2, 3.2)])
     np.testing.assert_allclose(shown["all three meet"], [(rest_2, 1.7)])
     for number in (4, 5):  # a further collision sets in
-        for r2, r1 in shown[f"{number} collisions"][60::40]:
+        for r2, r1 in lines(enlarged)[f"{number} collisions"][60::40]:
             for side, expected in ((1 - 1e-6, number), (1 + 1e-6, number - 1)):
                 if r1 > 0.01:
                     assert by_turns(r1 * side, r2, 0.5, 0.15)[0] == expected
-    (endless,) = (area for area in ax.collections if area.get_label() == "endless")
+    (endless,) = (area for area in enlarged.collections if area.get_label() == "endless")
     corner = endless.get_paths()[0].vertices
     for r2, r1 in corner[(corner[:, 0] > 0.001) & (corner[:, 1] > 0.01)][::7]:
         assert r1 == pytest.approx(edge(r2, 0.5, 0.15), abs=1e-3)
