@@ -376,20 +376,21 @@ def test_table_2_as_shown():
 
 
 def test_fig_experiments_structure_shows_table_2():
-    """Each ratio over its bound, above the letters of its first pair."""
+    """Each ratio over its bound, above its first pair, and above its middle ball; the medians."""
     part = TABLE_2.ratio / TABLE_2.bound
-    (ax,) = FIGURES.figures["fig-experiments-structure"].axes
-    names = [label.get_text().split()[0] for label in ax.get_xticklabels()]
-    column = [names.index("".join(sorted(t[:2]))) for t in part.index]
-    expected = [  # beside its column, on the side of the middle ball's letter
-        (x + 0.2 * np.sign(ord(t[1]) - ord(t[0])), part[t])
-        for x, t in zip(column, part.index, strict=True)
-    ]
-    for kind in "ABCD":  # of the middle ball
-        here = [place for t, place in zip(part.index, expected, strict=True) if t[1] == kind]
-        np.testing.assert_allclose(lines(ax)[kind], here, rtol=1e-12)
-    for x, (_, bar) in enumerate(points(ax, 2)[1:]):
-        assert bar[1] == pytest.approx(np.median([y for at, y in expected if round(at) == x]))
+    left, right = FIGURES.figures["fig-experiments-structure"].axes
+    for ax, of in ((left, lambda t: "".join(sorted(t[:2]))), (right, lambda t: t[1])):
+        names = [label.get_text() for label in ax.get_xticklabels()]
+        expected = [(names.index(of(t)), part[t]) for t in part.index]
+        np.testing.assert_allclose(lines(ax)["ratios"], expected, rtol=1e-12)
+        bars = [bar for _, bar in points(ax, 2)[1:]]
+        assert len(bars) == len(names) == len(set(names))
+        for x, bar in enumerate(bars):
+            assert bar[1] == pytest.approx(np.median([y for at, y in expected if at == x]))
+    table_1 = restitution_table()
+    e = [table_1.loc[x, y] for x, y in (label.get_text() for label in left.get_xticklabels())]
+    assert len(e) == 10
+    assert e == sorted(e)
 
 
 def test_fig_experiments_identify_as_drawn():
