@@ -210,8 +210,8 @@ def test_the_condition_number_and_how_it_grows():
 
 def test_fig_extremes_jump_as_drawn():
     """By the textbook over fifty digits: what rests is at the filled circle, what moves beyond."""
-    (ax,) = CHAPTER.figures["fig-extremes-jump"].axes
-    lines = [line for line in points(ax) if len(line) > 20]
+    by_ratio, on_springs = CHAPTER.figures["fig-extremes-jump"].axes
+    lines = [line for line in points(by_ratio) if len(line) > 20]
     ends, left = {}, {}
     for line, ball in zip(lines, (4, 4, 0, 0), strict=True):
         for moves, after in (line[0], line[10], line[-1]):
@@ -227,7 +227,9 @@ def test_fig_extremes_jump_as_drawn():
                 ]
                 assert said(len(started)) == CHAPTER.glued["ends-hits"]
     CHAPTER.tells({"ends-lost": 50 * (2 - left[0.0])}, off=0.5)
-    five, one = (line[:, 1] for line in points(ax, 13))  # on springs: alike at rest, no step
+    five, one = (
+        line[:, 1] for line in points(on_springs, 13)
+    )  # on springs: alike at rest, no step
     assert five[6] == pytest.approx(one[6], abs=1e-6)
     assert np.abs(np.diff([five, one])).max() < 0.02
     CHAPTER.tells({"ends-jump": float(ends[4, 0.0] - ends[4, 1e-12])})
