@@ -111,7 +111,7 @@ def test_fig_half():
     HALF.tells({"error-mm": 1000 * np.median(u_place), "error-ms": 1000 * np.median(u_time)})
     # The mean of all five: cosine and sine fitted in two seconds, beside the whole.
     size, damping, period, first = real_swing.common()
-    diamonds = marked(top, "d")
+    diamonds = marked(HALF.figures["fig-real-mean"].axes[0], "d")
     assert diamonds[:, 0] == pytest.approx(np.arange(1.8, 30, 2))
     t, *x = table("cradle_trace.csv").values()
     mean = 1000 * np.mean(x, axis=0)
