@@ -683,10 +683,13 @@ def implied(gap):
 
 def test_fig_gaps():
     ax = APPENDIX.figures["fig-real-gaps"].axes[0]
-    line = max(ax.get_lines(), key=lambda line: len(line.get_xdata())).get_xydata()
-    for gap, ratio in line[::3]:
-        assert ratio == pytest.approx(implied(gap * 0.625**0.4), abs=2e-5)  # energy: the depth
-    assert line[0, 1] == pytest.approx(0.1325, abs=1e-4)
+    unit = 1e6 * (0.0448 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4  # µm, at 1 m/s
+    assert len(ax.get_lines()) == len(ax.texts) == 3
+    for one, words in zip(ax.get_lines(), ax.texts, strict=True):
+        line, speed = one.get_xydata(), float(words.get_text().removesuffix(" m/s"))
+        for gap, ratio in line[::6]:
+            assert ratio == pytest.approx(implied(gap / (unit * speed**0.8)), abs=2e-5)  # energy
+        assert line[0, 1] == pytest.approx(0.1325, abs=1e-4)
     for word, v in (("slow", 0.5), ("fast", 2.0)):  # a gap of 2 µm
         a = implied(2e-6 / ((0.0448 * v**2 / (4 / 3 * 210e9 / 1.82 * np.sqrt(0.01109 / 2))) ** 0.4))
         APPENDIX.tells({f"look-{word}": -a / (2 - a)})
@@ -789,16 +792,14 @@ def test_the_two_pushes_at_ball_4():
         for release, (_, first, second) in found.items()
     }
     APPENDIX.tells({"fall-overlap": 100 * (1 - shares[3] / shares[1])}, off=0.1)
-    above, below = APPENDIX.figures["fig-real-forces"].axes
-    for ax, shown in ((above, (1,)), (below, (3, 1))):
-        curves = [line.get_xydata() for line in ax.get_lines()]
-        assert len(curves) == 2 * len(shown)
-        for k, curve in enumerate(curves):
-            t, *forces = found[shown[k // 2]]
-            expected = np.interp(curve[:, 0], 1e6 * unit / 0.69 * t, 100 * forces[k % 2])
-            assert curve[:, 1] == pytest.approx(expected, abs=0.5)
-        told = next(x.get_text() for x in ax.texts if "overlap" in x.get_text())
-        assert float(told.split()[1]) == pytest.approx(shares[shown[0]], abs=0.51)
+    (ax,) = APPENDIX.figures["fig-real-forces"].axes
+    curves = [line.get_xydata() for line in ax.get_lines()]
+    assert len(curves) == 4
+    for k, curve in enumerate(curves):
+        t, *forces = found[(3, 1)[k // 2]]
+        expected = np.interp(curve[:, 0], 1e6 * unit / 0.69 * t, 100 * forces[k % 2])
+        assert curve[:, 1] == pytest.approx(expected, abs=0.5)
+    APPENDIX.tells({"overlap-one": shares[1], "overlap-three": shares[3]}, off=0.46)
     # Of the push as a whole: when it has a hundredth of its peak, and when the next one has it.
     begins = {
         release: [t[np.argmax(push > 0.01)] for push in forces]
