@@ -102,7 +102,7 @@ function forces(given) {
   const { masses, velocities, exponent, stiffness: k, viscosity, gap = 0, record = false } = given;
   const n = masses.length;
   const chains = Springs([masses], [velocities], [k], [viscosity], [k.map(() => gap)]);
-  const out = Motions([made(n, () => 0)], [0], [0], [0]);
+  const out = Motions([made(n, () => 0)], [0], [0], [0], [0]);
   const [links, clock] = [made(n, Link), Clock()];
   const run = (resumed, room, effort) =>
     follow(0, resumed, n, chains, Law(exponent, ACCURACY, MOST), out, links, [clock], room, effort)[1];

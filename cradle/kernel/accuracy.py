@@ -146,6 +146,7 @@ def aim(n, law, s, clock):
     # Balls that strings hold together after all swing for ever, or with losses long.
     most = (6e4 if clock.lossy else 2e4) / accuracy**0.25
     clock.most = min(law.most, most) if clock.leans else law.most
+    clock.slow = FAINT * accuracy
     clock.trial = clock.effort = 0
     clock.error = clock.coarser = clock.told = 0.0
 
@@ -165,11 +166,11 @@ def judge(n, law, change, s, clock):
     radians = clock.steps * phase / max(used, 1)
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
-    often = many > clock.often
+    often = many > clock.often * max(1.0, (n - 1) / 9.0)
     compare = often or clock.leans > 0 or (clock.lossy > STRONG and not law.hunt)
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = (60.0 if clock.leans else 7.5) / (ratio * ratio * ratio * ratio - 1.0)
+        told = (60.0 if clock.leans else 15.0) / (ratio * ratio * ratio * ratio - 1.0)
         told *= change / law.accuracy
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
@@ -181,6 +182,8 @@ def judge(n, law, change, s, clock):
     finer = max(off * SPARE, 1.5) if compare else off * SPARE
     if off <= 1.0:
         finer = math.sqrt(2.0) if clock.lossy or (ratio == 0.0 and not clock.leans) else 2.0
+        if not clock.leans:  # else two runs agree that left out the same, and amplified that
+            clock.slow /= finer * finer * finer * finer
     clock.coarser = clock.h if off <= (1.0 if clock.leans else 2.0) else 0.0
     clock.h /= finer
     clock.trial += 1
@@ -231,7 +234,7 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
                 return k, REFUSED
             aim(n, law, s, clock)
             if len(record) > 0:
-                clock.h = out.h[k]
+                clock.h, clock.slow = out.h[k], out.slow[k]
             begin(n, law.p, law.hunt, s, clock, record)
         status, more = FINISHED, clock.high > 0
         while more:
@@ -252,7 +255,8 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
         put_down(n, s, clock, record)
         for i in range(n):
             out.v[k][i] = v[i] + clock.speed * (s[i].after - s[i].start)
-        out.error[k], out.h[k], out.steps[k] = clock.error, clock.h, clock.effort
+        out.error[k], out.steps[k] = clock.error, clock.effort
+        out.h[k], out.slow[k] = clock.h, clock.slow
         if status != FINISHED:
             return k, status
         clock.defect = defect_of(n, law, s, clock)

@@ -15,7 +15,7 @@ Takahashi and Imada, J. Phys. Soc. Jpn. 53 (1984) 3765; Rowlands, J. Comput. Phy
 
 import math
 
-from cradle.kernel.kinks import FAINT, grade, pay
+from cradle.kernel.kinks import grade, pay
 from cradle.kernel.state import FINISHED, PAUSED, REFUSED, UNFINISHED, apart
 
 # A run begins, and a flight ends, so many steps before the first node that is to find a contact
@@ -291,7 +291,7 @@ def run(n, law, effort, s, clock, record):
 
     A contact is watched from when its neighbour closes until both are idle; other balls fly freely.
     """
-    p, slow, h = law.p, FAINT * law.accuracy, clock.h
+    p, slow, h = law.p, clock.slow, clock.h
     lossy, leans = clock.lossy > 0.0, clock.leans > 0.0
     low, high = clock.low, clock.high
     while low < high and clock.steps < clock.most and effort > 0:

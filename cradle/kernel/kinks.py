@@ -64,7 +64,8 @@ class Motions(NamedTuple):
 
     v: Any
     error: Any  # estimate, relative to the fastest closing
-    h: Any  # the last step, in the chain's own units
+    h: Any  # the last step, and the closing speed that was too slow to be noticed, in the
+    slow: Any  # chain's own units
     steps: Any  # of all runs
 
 
@@ -89,6 +90,7 @@ class Clock:
     top: float  # and so far
     row: int  # of the record, to be written next
     h: float  # step,
+    slow: float  # closing speed that is too slow to be noticed,
     eta: float  # what it times a frequency may be, at most,
     most: float  # steps of a run
     trial: int  # number of the run,

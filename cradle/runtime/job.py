@@ -156,7 +156,8 @@ class Job:
 
 def motions(rows: int, n: int) -> Motions:
     """Return room for what so many chains come to."""
-    return Motions(np.empty((rows, n)), np.zeros(rows), np.zeros(rows), np.zeros(rows, np.int64))
+    error, h, slow = np.zeros((3, rows))
+    return Motions(np.empty((rows, n)), error, h, slow, np.zeros(rows, np.int64))
 
 
 def follow(
