@@ -1,5 +1,7 @@
 """Fits to the film of a swing: by closed form, against the truth, where a law or a film fails."""
 
+import re
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -87,7 +89,10 @@ def test_two_balls_and_what_is_said(two_balls):
     assert "chi-square" not in fit.summary()
     lines = fit.summary().splitlines()
     assert [line.split()[1] for line in lines[:4]] == [*NUMBERS]
-    assert lines[3].endswith(" m")
+    told, low, high, unit = re.fullmatch(r".* = (\S+) \[(\S+), (\S+)\] (\S+)", lines[3]).groups()
+    micrometres = 1e6 * np.array([fit.values["gaps"], *fit.intervals["gaps"]])
+    np.testing.assert_allclose([float(told), float(low), float(high)], micrometres, atol=0.006)
+    assert unit == "µm"
     assert "poor" not in fit.summary()
     assert str(fit) == f"SwingFit({'; '.join(lines)})"
 

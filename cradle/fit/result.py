@@ -81,13 +81,20 @@ class Estimate:
         return dict(zip(RESULT_COLUMNS, row, strict=True))
 
     def __str__(self) -> str:
+        return self.told()
+
+    def told(self, times: float = 1.0) -> str:
+        """Return value and confidence set as text, so many times as large: in a smaller unit."""
         if self.value is None:
             return f"{self.kind} {self.name}: not identified"
         # Two digits of the error.
-        digits = min(8, max(2, 1 - int(np.floor(np.log10(max(self.standard_error, 1e-8))))))
-        sets = " or ".join(f"[{low:.{digits}f}, {high:.{digits}f}]" for low, high in self.intervals)
+        error = max(self.standard_error, 1e-8) * times
+        digits = min(8, max(2, 1 - int(np.floor(np.log10(error)))))
+        sets = " or ".join(
+            f"[{low * times:.{digits}f}, {high * times:.{digits}f}]" for low, high in self.intervals
+        )
         end = f" at its {self.at_bound} bound" if self.at_bound else ""
-        return f"{self.kind} {self.name} = {self.value:.{digits}f} {sets}{end}"
+        return f"{self.kind} {self.name} = {self.value * times:.{digits}f} {sets}{end}"
 
 
 class Group(NamedTuple):
