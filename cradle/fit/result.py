@@ -83,18 +83,16 @@ class Estimate:
     def __str__(self) -> str:
         return self.told()
 
-    def told(self, times: float = 1.0) -> str:
-        """Return value and confidence set as text, so many times as large: in a smaller unit."""
+    def told(self, times: float = 1.0, unit: str = "") -> str:
+        """Return value and confidence set as text; in a smaller unit, so many times as large."""
         if self.value is None:
             return f"{self.kind} {self.name}: not identified"
         # Two digits of the error.
-        error = max(self.standard_error, 1e-8) * times
-        digits = min(8, max(2, 1 - int(np.floor(np.log10(error)))))
-        sets = " or ".join(
-            f"[{low * times:.{digits}f}, {high * times:.{digits}f}]" for low, high in self.intervals
-        )
+        digits = 1 - int(np.floor(np.log10(max(self.standard_error, 1e-8) * times)))
+        form = f".{min(8, max(2, digits))}f"
+        sets = " or ".join(f"[{a * times:{form}}, {b * times:{form}}]" for a, b in self.intervals)
         end = f" at its {self.at_bound} bound" if self.at_bound else ""
-        return f"{self.kind} {self.name} = {self.value * times:.{digits}f} {sets}{end}"
+        return f"{self.kind} {self.name} = {self.value * times:{form}} {sets}{unit}{end}"
 
 
 class Group(NamedTuple):

@@ -19,9 +19,8 @@ from cradle.swinging.pendulums import Pendulums
 from cradle.swinging.record import Swing
 from cradle.swinging.swing import swing
 
-#: What can be fitted, the unit in which the summary tells it, and how many of that are one of SI.
-UNITS = {"period": (" s", 1.0), "damping": (" 1/s", 1.0), "restitution": ("", 1.0),
-         "gaps": (" µm", 1e6)}  # fmt: skip
+#: What can be fitted; how many of the unit that the summary tells are one of SI, and the unit.
+UNITS = {"period": (1, " s"), "damping": (1, " 1/s"), "restitution": (1, ""), "gaps": (1e6, " µm")}
 _LIMITS = {"period": ("must lie in [0.1, 30]", 0.1, 30.0), "damping": ("must be at least 0", 0.0),
            "restitution": asked.PART, "gaps": ("must be at least 0", 0.0)}  # fmt: skip
 # A law fails if chi-square has a chance below the one, or residuals are alike by so many standard
@@ -50,8 +49,7 @@ class SwingFit:
         wide = ", ".join(f"{name} {times:.1f} times" for name, times in self.widened.items())
         chi = f"chi-square {self.chi_square:.1f}, " if self.chi_square else ""
         return "\n".join([
-            *(one.told(UNITS[name][1]) + UNITS[name][0] * one.identified
-              for name, one in self.estimates.items()),
+            *(one.told(*UNITS[name]) for name, one in self.estimates.items()),
             f"{chi}degrees of freedom {self.degrees_of_freedom}, "
             f"reading {self.reading:.2g} m, correlation of residuals {self.correlation:.2f}",
             *[f"poor fit: intervals are too short, though widened: {wide or 'none'}"] * self.poor,
