@@ -1,6 +1,7 @@
 """The errata: their numbers by a second route, and the tests that they name."""
 
 import ast
+import csv
 import math
 import re
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import truth
 from chapters import Chapter, floats, number
 from march import march
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from test_book_n_balls import READINGS, outcome
 from turns import by_turns, edge
@@ -59,7 +61,7 @@ def test_every_number_is_shown_and_every_test_exists():
 
 #: An entry: its label, number, kind and line. A reference to one, from any page.
 ENTRY = re.compile(r"\(erratum-([\w-]+)\)=(\\n\",\s+\"|\n)\*\*(\d*)\*\*")
-REFERENCE = re.compile(r"\{ref\}`(\d*) <erratum-([\w-]+)>`")
+REFERENCE = re.compile(r"\{ref\}`((?:erratum )?)(\d*) <erratum-([\w-]+)>`")
 
 
 def numbered() -> dict[Path, str]:
@@ -71,7 +73,7 @@ def numbered() -> dict[Path, str]:
     return {
         path: ENTRY.sub(
             lambda m: f"(erratum-{m[1]})={m[2]}**{order[m[1]]}**",
-            REFERENCE.sub(lambda m: f"{{ref}}`{order[m[2]]} <erratum-{m[2]}>`", text),
+            REFERENCE.sub(lambda m: f"{{ref}}`{m[1]}{order[m[3]]} <erratum-{m[3]}>`", text),
         )
         for path, text in pages.items()
     }
@@ -86,8 +88,15 @@ def test_entries_are_numbered_as_they_stand_and_short():
     assert [int(number) for number, *_ in entries] == list(range(1, len(entries) + 1))
     assert len(entries) == len(re.findall(r"^\*\*\d", TEXT, flags=re.MULTILINE))
     assert {kind for _, kind, _ in entries} == {"slip", "error", "unsaid", "open"}
-    first = TEXT[TEXT.index("## The six that matter") : TEXT.index("## What a program needs")]
-    assert len(re.findall(r"^\*\*\d+\*\* · ", first, flags=re.MULTILINE)) == 6
+    equations, choices, _ = re.split(r"^## (?=Four|What a program)", TEXT, flags=re.MULTILINE)
+    _, equations = equations.split("## Six equations")
+    for section in equations, choices:
+        assert len(re.findall(r"^\*\*\d+\*\* · ", section, flags=re.MULTILINE)) == 4
+    with (TESTS.parent / "data" / "ledger.csv").open(encoding="utf-8", newline="") as file:
+        corrected = {r["item"] for r in csv.DictReader(file) if r["status"] == "derived, corrected"}
+    bold = " ".join(re.findall(r"\*\*.*?\*\*", equations))
+    assert {f"Eq. {n}" for n in re.findall(r"<eq-p(\d+)>", bold)} == corrected
+    assert len(corrected) == 6
     assert max(len(words.split()) for *_, words in entries) <= 40
 
 
@@ -135,6 +144,26 @@ def test_ends_of_eq_44_and_factors_of_eq_14():
     assert back_impact_line(float(GLUED["eq-44-r2"]), 0.5, 0.5, 0.15) == pytest.approx(0, abs=1e-3)
     soft = math.pi**2 / 8
     CHAPTER.tells({"loss-factor": soft - 0.5, "effective-factor": soft - 1})
+
+
+def test_eq_10_against_the_motion_that_it_integrates():
+    """Three balls on equal springs, by an integrator, until the first contact opens."""
+
+    def slopes(_, y):
+        q, v = y[:3], y[3:]
+        return *v, q[1] - q[0], q[0] - 2 * q[1] + q[2], q[1] - q[2]
+
+    def opens(_, y):
+        return y[0] - y[1]
+
+    opens.terminal, opens.direction = True, -1
+    start = 0, 0, 0, 1, 0, 0
+    run = solve_ivp(slopes, (0, 9), start, events=opens, rtol=1e-10, atol=1e-12, max_step=0.1)
+    lost = 1 - run.y[3, -1]
+    assert run.t[-1] > 2
+    assert float(GLUED["lost"]) == pytest.approx(lost, abs=6e-4)
+    assert number(GLUED["eq-10"]) == pytest.approx(-lost, abs=6e-4)
+    assert float(GLUED["by-balls"]) == 1 / (1 + 1)
 
 
 def test_eq_34_error_beyond_its_range():
