@@ -142,8 +142,23 @@ def test_every_item_has_one_row_in_order():
 
 def test_the_page_explains_every_verdict():
     cells = nbformat.read(ROOT / "book" / "ledger.ipynb", as_version=4).cells
-    rows = re.findall(r"^\| ([a-z, ]+) \|", cells[0].source, flags=re.MULTILINE)
+    words = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    rows = re.findall(r"^\| ([a-z, ]+) \|", words, flags=re.MULTILINE)
     assert set(rows) == VERDICTS | {"verdict"}
+
+
+def test_every_corrected_item_links_to_its_erratum():
+    cells = nbformat.read(ROOT / "book" / "ledger.ipynb", as_version=4).cells
+    shown = "".join(
+        output.get("data", {}).get("text/html", "")
+        for cell in cells
+        for output in cell.get("outputs", ())
+    ).replace("&nbsp;", " ")
+    for row in ROWS:
+        if row["status"] in {"derived, corrected", "reproduced, differs"}:
+            (line,) = (one for one in shown.split("<tr>") if f">{row['item']}</a>" in one)
+            reason = re.search(r'href="errata\.html#([\w-]+)"', line)[1]
+            assert reason in labels("errata"), row["item"]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row["item"])
