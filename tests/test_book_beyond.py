@@ -13,7 +13,14 @@ from problem import Problem
 from stored import numbers
 from truth import solve
 
-from cradle import Chain, SpringChain, collide, outcomes, post_impact_velocities
+from cradle import (
+    Chain,
+    ImpulseCorrelation,
+    SpringChain,
+    collide,
+    outcomes,
+    post_impact_velocities,
+)
 from cradle.kernel.state import LIMITS
 
 CHAPTER = Chapter("beyond")
@@ -240,6 +247,17 @@ def test_ratios_that_differ_from_ball_to_ball_give_the_springs_for_one_strike():
     ratios = points(along)[0][:, 1]
     after = post_impact_velocities(*struck(5), 1.0, ratios, excess="saturate")
     np.testing.assert_allclose(after, HERTZ["five equal"], rtol=0, atol=2e-4)
+    model = ImpulseCorrelation(ratios, excess="saturate")
+    assert (collide(Chain(*struck(5), 1), model).collisions == 1).all()
+    # By hand: the impulses of the first two contacts, from the velocities of balls 1 and 2.
+    first, second, _ = ratios
+    tau_2 = 2 / (2 - first)
+    start = (1 - first) * tau_2 - (1 - second) * first * tau_2
+    rest = (start + np.sqrt(start**2 + (2 - second) * start * first * tau_2)) / (2 - second)
+    by_hand = [1 - tau_2, tau_2 - first * tau_2 - rest]
+    np.testing.assert_allclose(by_hand, HERTZ["five equal"][:2], rtol=0, atol=2e-4)
+    # One ratio for all leaves ball 2 at rest.
+    assert HERTZ["five equal"][1] < -0.03
     springs = collide(Chain(*struck(5, 2), 1), SpringChain(1.0)).velocities
     options = {"backward": ratios[::-1], "excess": "saturate"}
     after = post_impact_velocities(*struck(5, 2), 1.0, ratios, **options)
