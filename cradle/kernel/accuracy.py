@@ -53,7 +53,7 @@ def refuse(wrong, rule, place, clock):
 
 
 @apart
-def measure(n, chain, law, s, clock):
+def measure(n, chain, law, sized, s, clock):
     """Write a chain down in its own units; what cannot be resolved beside the rest is refused."""
     m, v, p = chain.m, chain.v, law.p
     clock.rule = clock.fastest = 0
@@ -66,6 +66,7 @@ def measure(n, chain, law, s, clock):
         if i < n - 1:
             known = 0.0 < chain.k[i] < math.inf and 0.0 <= chain.loss[i] < math.inf
             refuse(not (known and abs(chain.gap[i]) < math.inf), VALUE, i, clock)
+            sized = sized or chain.loss[i] > 0.0 or chain.gap[i] != 0.0
             hard = max(hard, chain.k[i])
             if v[i] - v[i + 1] > fast or i == 0:
                 clock.fastest, fast = i, v[i] - v[i + 1]
@@ -76,10 +77,10 @@ def measure(n, chain, law, s, clock):
     clock.stiffness, clock.speed = chain.k[at], fast if fast > 0.0 else 1.0
     clock.mass = m[at] / (m[at] + m[at + 1]) * m[at + 1]
     size = clock.mass / chain.k[at] * clock.speed * clock.speed
-    if TINY < size < 1.0 / TINY:
-        clock.length = size**part
-    else:
+    if not TINY < size < 1.0 / TINY:
         clock.length = clock.mass**part / chain.k[at] ** part * clock.speed ** (2.0 * part)
+    else:  # a power takes as long as a step: it is left out where no length is asked for
+        clock.length = size**part if sized else 1.0
     refuse(clock.mass < NORMAL, REDUCED, at, clock)
     refuse(not TINY <= clock.length <= 1.0 / TINY, QUICK, at, clock)
     if clock.rule > 0:
@@ -136,7 +137,8 @@ def aim(n, law, s, clock):
     accuracy, spread = law.accuracy, max(0.0, 1.5 - law.p)
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
-    clock.eta = min(part**0.25, (1.5 * part) ** (1.0 / 3.5))
+    root = math.sqrt(math.sqrt(part))
+    clock.eta = min(root, (1.5 * part) ** (1.0 / 3.5)) if part < 0.04 else root  # it is less there
     eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
@@ -229,7 +231,7 @@ def follow(begun, resumed, n, chains, law, out, s, clocks, record, effort):
         v = chains.v[k]
         if not resumed:
             chain = Springs(chains.m[k], v, chains.k[k], chains.loss[k], chains.gap[k])
-            measure(n, chain, law, s, clock)
+            measure(n, chain, law, len(record) > 0, s, clock)
             if clock.rule > 0:
                 return k, REFUSED
             aim(n, law, s, clock)
