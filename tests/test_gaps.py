@@ -79,8 +79,16 @@ def test_what_the_chapter_says():
     chain = ["one_gap", "gap_of_pair", "with_own_gap", "with_own_shift", "with_own_quotient"]
     assert sorted(chain, key=rms.get, reverse=True) == chain
     assert rms["with_own_quotient"] < rms["stiffness_of_pair"] / 2 < rms["one_ratio"] / 2
-    *few, own = (line.split()[-1] for line in CHAPTER.printed("scored").splitlines()[2:])
-    assert own == str(sum(row["with_own_gap"] <= 0.05 for row in rows))
+    *few, gap, quotient = (line.split()[-1] for line in CHAPTER.printed("scored").splitlines()[2:])
+    assert gap == str(sum(row["with_own_gap"] <= 0.05 for row in rows))
+    assert quotient == str(sum(row["with_own_quotient"] <= 0.05 for row in rows))
+    assert int(quotient) > 55
+    own = [row["own_quotient"] for row in rows]
+    ends = min(own), max(own)
+    assert ends == (gaps.QUOTIENTS[0], gaps.QUOTIENTS[-1]) == (1e-4, 1e4)
+    told = CHAPTER.glued["scored-quotient-least"], CHAPTER.glued["scored-quotient-most"]
+    assert told == ("10⁻⁴", "10 000".replace(" ", "\u202f"))
+    assert CHAPTER.glued["scored-pair"] == max(few, key=int)
     assert max(few, key=int) == str(sum(row["stiffness_of_pair"] <= 0.05 for row in rows))
 
 
