@@ -68,6 +68,36 @@ def test_the_next_step_is_for_one_striker(still):
         assert tab.locator(".next:visible").count() == (speed == 0)
 
 
+def test_the_next_step_is_of_its_setting_alone(still):
+    """With the ratio 0, say, the answer is that of the school books."""
+    tab = still("")
+    for times, seen in ((0, 1), (1, 0)):
+        for _ in range(times):
+            tab.get_by_label("ratio", exact=True).press("ArrowLeft")
+        tab.act("step()")
+        tab.drawn()
+        assert tab.locator(".next:visible").count() == seen
+
+
+def test_no_outline_runs_through_a_number(still):
+    tab = still("")
+    tab.drawn()
+    for ball, speed in enumerate((-0.1, 0.15, 1.1), start=1):
+        tab.get_by_label(f"your guess for ball {ball}, m/s").fill(str(speed))
+    tab.act("step()")
+    tab.drawn()
+    crossed = tab.evaluate("""() => [...document.querySelectorAll(".drawn .number")].map((it) => {
+      const box = it.getBoundingClientRect();
+      const outlines = document.querySelectorAll(".drawn rect.guess, .drawn rect.before");
+      return [...outlines].some((rect) => {
+        const { left, right, top, bottom, width } = rect.getBoundingClientRect();
+        const inside = (x) => width > 0 && box.left < x && x < box.right;
+        return top < box.bottom && box.top < bottom && (inside(left) || inside(right));
+      });
+    })""")
+    assert crossed == [False] * 3
+
+
 @pytest.mark.parametrize(
     ("name", "before"), [("Guess first", 1), ("Full screen", 0), ("Full screen", 1)]
 )

@@ -91,7 +91,7 @@
       const left = make("div", { class: "left" }, stages, outcome(guessed), node("run"), node("words"));
       if (beside) this.panels.settings.rarer.append(beside.node);
       const right = make("div", { class: "right" }, outcome(!guessed), node("pictures"));
-      this.link = make("a", { href: "explorer.html" }, "Open in the full explorer");
+      this.link = make("a", { href: "explorer.html" }, "Open in the live cradle");
       this.host.replaceChildren(
         node("question"),
         node("scenes"),

@@ -297,8 +297,8 @@
       inAll.textContent = now ? `${inside ? "moves" : "total"} ${kinetic}` : "";
       handles.show(state, box(bars));
       told.textContent = guess && number === 0 ? explorer.guessInWords(state) : "";
-      const struck = seen.from === host.dataset.scene && hit.before.slice(1).every((v) => v === 0);
-      next.hidden = !host.dataset.next || covered || !struck;
+      const same = seen.scene === host.dataset.scene && number === 0; // with gaps, say, it would be false
+      next.hidden = !host.dataset.next || covered || !same;
     }
     return { node, show };
   }

@@ -152,7 +152,13 @@
       parts.push(bar(before[ball], 'class="before"'), bar(now[ball], `fill="${colour(ball)}"`));
       if (guess.length) parts.push(bar(guess[ball], 'class="guess"'));
       const leftwards = +now[ball].toFixed(2) < 0;
-      const at = x(now[ball]) + (leftwards ? -gap : gap) * em;
+      const side = leftwards ? -1 : 1;
+      // A number stands beyond an outline that would run through it.
+      const beyond = (value) => side * (x(value) - x(0));
+      let tip = beyond(now[ball]);
+      for (const edge of [before[ball], guess[ball] ?? 0].map(beyond).sort((a, b) => a - b))
+        if (edge > tip && edge < tip + 2.8 * em) tip = edge;
+      const at = px(x(0) + side * (tip + gap * em));
       const end = leftwards ? 'text-anchor="end" class="number"' : 'class="number"';
       parts.push(text(at, top + em, fixed(now[ball]), end));
       const way = Math.sign(before[ball]);

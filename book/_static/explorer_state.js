@@ -270,12 +270,12 @@
       const { setting, clock, view, swing, record } = this;
       const hit = swing.hit(view.number);
       const firstAfter = swing.hit(0).after;
-      const { covered, guessing, other, own, lastScene: from } = this;
+      const { covered, guessing, other, own } = this;
       const again = !covered && Boolean(this.again || guessing);
       const words =
         view.notice ||
         (covered ? GUESS : explorer.outcomeInWords(setting, hit, view.number, record));
-      const seen = { again, guessing, covered, other, own, from, words, now: this.now(hit) };
+      const seen = { again, guessing, covered, other, own, words, now: this.now(hit) };
       return { ...view, setting, clock, hit, record, firstAfter, ...seen };
     }
   }
