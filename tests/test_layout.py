@@ -382,13 +382,19 @@ def test_equations_keep_about_their_place(visit, width: int):
 
 
 def test_folds_and_boxes(visit, html: Path):
-    """They show who has the key, have names and room for a finger; a link into one opens it."""
+    """They show who has the key, have names, room for a finger and for the lines of their code; a
+    link into one opens it."""
     tab = visit(chapter="measure", width=390, height=800, has_touch=True, is_mobile=True)
     summaries = tab.locator(".bd-content details > summary")
     assert summaries.count() > 2
     for summary in summaries.all():
         if summary.is_visible():
             assert summary.bounding_box()["height"] >= 36
+    for fold in tab.locator(".bd-content details.hide:visible").all():  # open, as wide as the text
+        fold.locator("summary").click()
+        text = fold.evaluate("(node) => node.closest('section').clientWidth")
+        assert fold.bounding_box()["width"] == pytest.approx(text, abs=2)
+        fold.locator("summary").click()
     first = tab.locator(".bd-content details > summary:visible").first
     first.focus()
     tab.keyboard.press("Shift+Tab")
