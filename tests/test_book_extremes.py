@@ -227,9 +227,7 @@ def test_fig_extremes_jump_as_drawn():
                 ]
                 assert said(len(started)) == CHAPTER.glued["ends-hits"]
     CHAPTER.tells({"ends-lost": 50 * (2 - left[0.0])}, off=0.5)
-    five, one = (
-        line[:, 1] for line in points(on_springs, 13)
-    )  # on springs: alike at rest, no step
+    five, one = (line[:, 1] for line in points(on_springs, 13))  # alike at rest, no step
     assert five[6] == pytest.approx(one[6], abs=1e-6)
     assert np.abs(np.diff([five, one])).max() < 0.02
     CHAPTER.tells({"ends-jump": float(ends[4, 0.0] - ends[4, 1e-12])})

@@ -79,6 +79,15 @@ def test_the_next_step_is_of_its_setting_alone(still):
         assert tab.locator(".next:visible").count() == seen
 
 
+def test_the_next_step_is_of_the_first_hit_alone(still):
+    tab = still("")
+    for number in (0, 1):
+        tab.act("step()")
+        tab.drawn()
+        assert tab.state("view.number") == number
+        assert tab.locator(".next:visible").count() == (number == 0)
+
+
 def test_no_outline_runs_through_a_number(still):
     tab = still("")
     tab.drawn()

@@ -91,7 +91,7 @@ def test_two_balls_and_what_is_said(two_balls):
     assert [line.split()[1] for line in lines[:4]] == [*NUMBERS]
     told, low, high, unit = re.fullmatch(r".* = (\S+) \[(\S+), (\S+)\] (\S+)", lines[3]).groups()
     micrometres = 1e6 * np.array([fit.values["gaps"], *fit.intervals["gaps"]])
-    np.testing.assert_allclose([float(told), float(low), float(high)], micrometres, atol=0.006)
+    assert [told, low, high] == [f"{x:.2f}" for x in micrometres]  # two digits of the error
     assert unit == "µm"
     assert "poor" not in fit.summary()
     assert str(fit) == f"SwingFit({'; '.join(lines)})"

@@ -390,7 +390,9 @@ def test_folds_and_boxes(visit, html: Path):
     for summary in summaries.all():
         if summary.is_visible():
             assert summary.bounding_box()["height"] >= 36
-    for fold in tab.locator(".bd-content details.hide:visible").all():  # open, as wide as the text
+    folds = tab.locator(".bd-content details.hide:visible").all()
+    assert len(folds) > 2
+    for fold in folds:  # open, as wide as the text
         fold.locator("summary").click()
         text = fold.evaluate("(node) => node.closest('section').clientWidth")
         assert fold.bounding_box()["width"] == pytest.approx(text, abs=2)
