@@ -160,7 +160,7 @@ def judge(n, law, change, s, clock):
     Of the run before, if it was fine enough, the outcome counts, and its change from another: near
     by luck, two runs can agree, so that it takes three where balls that strings pull swing long.
     """
-    many = used = 0
+    many, used, longer = 0, 0, max(1.0, (n - 1) / 9.0)  # long rows amplify more
     for c in range(n - 1):
         many += max(s[c].kinks - 2, 0)
         used += min(s[c].kinks, 1)
@@ -168,12 +168,12 @@ def judge(n, law, change, s, clock):
     radians = clock.steps * phase / max(used, 1)
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
-    often = many > clock.often * max(1.0, (n - 1) / 9.0)
+    often = many > clock.often * longer
     compare = often or clock.leans > 0 or (clock.lossy > STRONG and not law.hunt)
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = (60.0 if clock.leans else 15.0) / (ratio * ratio * ratio * ratio - 1.0)
-        told *= change / law.accuracy
+        told = (60.0 if clock.leans else 15.0 * math.sqrt(longer)) * change / law.accuracy
+        told /= ratio * ratio * ratio * ratio - 1.0
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
         error = max(error, told, 0.25 * clock.told)
