@@ -453,6 +453,20 @@ def test_rows_that_amplify_a_thousandfold(monkeypatch, seed, accuracy):
     np.testing.assert_array_equal(trace.path[-1], found)  # the run that is recorded is the last
 
 
+@needs_numba
+def test_balls_that_nothing_touches_spoil_no_answer(monkeypatch):
+    """A long row may have more kinks before runs are compared; they do not make it long."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    rng, light = np.random.default_rng(3), [1e-5] * 95
+    m, k = (magnitudes(rng, spread, (3000, size))[1181] for spread, size in ((2, 8), (1, 7)))
+    root = uniform(rng, 0, 1, (3000, 7))[1181]
+    gaps = root * root + 1e-6
+    exact = spring_velocities(m, struck(8), k, gaps=gaps, accuracy=1e-6)
+    v, ahead = [*struck(8), *(5 + 0.01 * np.arange(95))], [*gaps, *[1.0] * 95]
+    found = spring_velocities([*m, *light], v, [*k, *light], gaps=ahead, accuracy=1e-2)
+    assert abs(found[:8] - exact).max() < 5e-3
+
+
 def test_leading_axes_broadcast():
     v = np.array([[1.0, 0, 0], [1.0, 0.5, 0], [0, 0, -1.0]])
     found = spring_velocities(np.ones((2, 1, 3)), v, [1.0, 2.0], gaps=[[[0.1, 0]], [[0.0, 0]]])

@@ -33,8 +33,8 @@ ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
 # C, at least, without losses and with them, and for each radian of a ball, on average; the largest
 # step, in radians.
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
-# Kinks beyond two of each contact, and with leans radians, from which runs are compared.
-OFTEN, LONG = 4.0, 30.0
+# From so many kinks beyond two of each contact (more in a longer row) or radians runs are compared.
+OFTEN, LONG, SPREAD = 4.0, 30.0, 45.0
 STRONG = 0.5  # A from which on they are, of viscoelastic balls: it may open a contact at any node
 TRIALS = 16  # runs of a chain, each finer than the one before
 DAMPED = 0.25  # step times A times the square of a frequency, at most
@@ -138,7 +138,7 @@ def aim(n, law, s, clock):
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
     part = accuracy / clock.hard
     root = math.sqrt(math.sqrt(part))
-    clock.eta = min(root, (1.5 * part) ** (1.0 / 3.5)) if part < 0.04 else root  # it is less there
+    clock.eta = min(root, (1.5 * part) ** (1.0 / 3.5)) if part < 0.04 else root
     eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
     top = highest(n, law.p, s)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
@@ -160,7 +160,7 @@ def judge(n, law, change, s, clock):
     Of the run before, if it was fine enough, the outcome counts, and its change from another: near
     by luck, two runs can agree, so that it takes three where balls that strings pull swing long.
     """
-    many, used, longer = 0, 0, max(1.0, (n - 1) / 9.0)  # long rows amplify more
+    many = used = 0
     for c in range(n - 1):
         many += max(s[c].kinks - 2, 0)
         used += min(s[c].kinks, 1)
@@ -168,11 +168,11 @@ def judge(n, law, change, s, clock):
     radians = clock.steps * phase / max(used, 1)
     swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
     off = phase / clock.eta * math.sqrt(math.sqrt(swung))
-    often = many > clock.often * longer
+    often = many > clock.often * max(1.0, used / SPREAD)
     compare = often or clock.leans > 0 or (clock.lossy > STRONG and not law.hunt)
     told, ratio = math.inf, clock.coarser / clock.h
     if ratio > 0.0:
-        told = (60.0 if clock.leans else 15.0 * math.sqrt(longer)) * change / law.accuracy
+        told = (60.0 if clock.leans else max(15.0, 5.0 * math.sqrt(used))) * change / law.accuracy
         told /= ratio * ratio * ratio * ratio - 1.0
     error = off * off * off * math.sqrt(off)
     if off <= 1.0 and compare:
