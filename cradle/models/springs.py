@@ -220,7 +220,7 @@ class Path:
             if shown:
                 found.append((t, Event(kind, c), v, push))
         at, events, path, force = map(list, zip(*found, strict=True))
-        path[-1] = self.last
+        path[-1] = self.v[-1] = self.last  # also where pulls ended within the last step
         return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
 
 
