@@ -25,7 +25,7 @@ from cradle import (
     hertz_stiffness,
     paper_chain,
 )
-from cradle.fit import Tracks, velocities_from_tracks
+from cradle.fit import velocities_from_tracks
 from cradle.fit.tracks import Track
 
 LENGTH, GRAVITY = 0.3, 9.81
@@ -54,18 +54,27 @@ def swing(velocity, times):
     return 2 * LENGTH * largest * sn * dn
 
 
+def marked(names, before, after, times, off, apart):
+    """Return tracks of balls that hang so far apart and meet at time 0, each mark so much off."""
+    return {
+        name: Track(
+            times - times[0],
+            k * apart
+            + np.where(times < 0, swing(before[k], times), swing(after[k], times))
+            + off[k],
+        )
+        for k, name in enumerate(names)
+    }
+
+
 def film(name, speed, random):
     """Return the tracks of one shot; the impact falls anywhere between two frames."""
     chain, model = paper_chain(name, speed)
     after = collide(chain, model).velocities
     times = (np.arange(2 * FRAMES + 1) - FRAMES + random.random() - 0.5) / FRAMES_PER_SECOND
-    tracks: Tracks = {}
-    for k, letter in enumerate(name):
-        way = np.where(times < 0, swing(chain.velocities[k], times), swing(after[k], times))
-        marks = k * DIAMETER + way + SCATTER * random.standard_normal(times.size)
-        label = f"{letter}{k + 1}" if name.count(letter) > 1 else letter
-        tracks[label] = Track(times - times[0], marks)
-    return tracks, chain.masses
+    labels = [f"{x}{k}" if name.count(x) > 1 else x for k, x in enumerate(name, 1)]
+    off = SCATTER * random.standard_normal((len(name), times.size))
+    return marked(labels, chain.velocities, after, times, off, DIAMETER), chain.masses
 
 
 def export(tracks):
@@ -115,13 +124,8 @@ def film_of_the_row(speed=0.7):
     before = speed * np.eye(5)[0]
     count = int(np.pi / 2 * np.sqrt(LENGTH / GRAVITY) * FRAMES_PER_SECOND)
     moments = (np.arange(-count, count + 1) + 0.3) / FRAMES_PER_SECOND
-    after = row_struck(before, 1)
-    ways = [np.where(moments < 0, swing(v, moments), swing(w, moments))
-            for v, w in zip(before, after, strict=True)]  # fmt: skip
     off = SCATTER * ndtri(np.random.default_rng(7).random((5, moments.size)))
-    places = np.array(ways) + off + 2 * RADIUS * np.arange(5)[:, None]
-    times = moments - moments[0]
-    return export({f"{k}": Track(times, x) for k, x in enumerate(places, 1)})
+    return export(marked("12345", before, row_struck(before, 1), moments, off, 2 * RADIUS))
 
 
 def row_of(lifted):

@@ -157,8 +157,8 @@ def aim(n, law, s, clock):
 def judge(n, law, change, s, clock):
     """Estimate the error of a run, by its steps and by the run before; tell if it is to be finer.
 
-    Of the run before, if it was fine enough, the outcome counts, and its change from another: near
-    by luck, two runs can agree, so that it takes three where balls that strings pull swing long.
+    Of the run before, if it was fine enough, the outcome counts, and its change from another: two
+    may agree by luck, most in long rows; where balls that strings pull swing long, it takes three.
     """
     many = used = 0
     for c in range(n - 1):

@@ -64,8 +64,8 @@ class Motions(NamedTuple):
 
     v: Any
     error: Any  # estimate, relative to the fastest closing
-    h: Any  # the last step, and the closing speed that was too slow to be noticed, in the
-    slow: Any  # chain's own units
+    h: Any  # the last step, in the chain's own units,
+    slow: Any  # and the closing speed that was too slow to be noticed
     steps: Any  # of all runs
 
 
