@@ -189,7 +189,7 @@ def test_right_wrong_and_endless(visit, solver):
     [
         ("rates", "min(a, bound)", "a", [1], "expected 0.25, 1; \u22120.25, \u22120.25, 1"),
         ("rates", "min(a, bound)", "1.0", [0, 1], "expected 1, 0.15; \u22121, 0.85, 0.15"),
-        ("way_to_event", "return inf", "return 9.0", [4], "9 came out; expected inf"),
+        ("way_to_stop", "return inf", "return 9.0", [4], "9 came out; expected inf"),
         ("three_balls", "dv * way", "dv", [0], "came out; expected 0.4"),
     ],
 )

@@ -24,17 +24,17 @@ from sphinx.application import Sphinx
 HERE = Path(__file__).parent
 PLACE = '<div class="reader-solver"'
 #: The functions that the page builds up.
-PIECES = ("rates", "way_to_event", "three_balls")
+PIECES = ("rates", "way_to_stop", "three_balls")
 #: What they need.
 HEAD = "import numpy as np"
 #: What each of them computes, told where the reader's lines come.
 TOLD = {
     "rates": ("Eqs. 16 to 19; the bound is Eq. 34",),
-    "way_to_event": ("One way for each phase",),
+    "way_to_stop": ("One way for each phase",),
     "three_balls": (
         "1 Who acts? Ask rates: push, dv",
         "2 u and slope of both contacts",
-        "3 way_to_event, twice: the nearer",
+        "3 way_to_stop, twice: the nearer",
         "4 Work, and with it owed",
         "5 tau, v; a row of path",
         "6 Next phase; who drives",
@@ -47,12 +47,12 @@ CALLS = {
         "rates([1, 3, 1], 0.5, [True, True], 1)",
         "rates([1, 2, 1], 0.15, [False, True], 1)",
     ),
-    "way_to_event": (
-        'way_to_event("compression", 1, -2, 0)',
-        'way_to_event("expansion", 0, -2, 0.16)',
-        'way_to_event("expansion", 0, -2, 0)',
-        'way_to_event("idle", -1, 4, 0)',
-        'way_to_event("idle", -1, -4, 0)',
+    "way_to_stop": (
+        'way_to_stop("compression", 1, -2, 0)',
+        'way_to_stop("expansion", 0, -2, 0.16)',
+        'way_to_stop("expansion", 0, -2, 0)',
+        'way_to_stop("idle", -1, 4, 0)',
+        'way_to_stop("idle", -1, -4, 0)',
     ),
     "three_balls": (
         "three_balls([1, 1, 1], [1, 0, 0], [0.9, 0.8], 0.15)[1][2:]",
