@@ -209,7 +209,7 @@ if __name__ == "__main__":
 
 
 def test_reading_the_paper_counts_the_equations_of_the_ledger():
-    """The page says at its start how many stand, and which ones are corrected."""
+    """It says at its start how many stand, and which are corrected; so does the article's abstract."""
     words = (ROOT / "book" / "reading.md").read_text(encoding="utf-8").partition("These pages")[0]
     verdicts = {row["item"]: row["status"] for row in ROWS if row["item"].startswith("Eq.")}
     equal = sum(status == "derived, equal" for status in verdicts.values())
@@ -220,3 +220,6 @@ def test_reading_the_paper_counts_the_equations_of_the_ledger():
     listed = words.partition("corrected")[2].partition("hypothesis")[0]
     assert re.findall(r"<eq-p(\d+)>", listed) == [*corrected, "16"]
     assert verdicts["Eq. 16"] == "hypothesis"
+    article = (ROOT / "publication" / "rescience" / "metadata.yaml").read_text(encoding="utf-8")
+    right = f"Of its {len(verdicts)} equations {equal} are right as printed"
+    assert f"{right}, {len(corrected)} are corrected, and one" in article
