@@ -209,7 +209,7 @@ if __name__ == "__main__":
 
 
 def test_reading_the_paper_counts_the_equations_of_the_ledger():
-    """It says at its start how many stand, and which are corrected; so does the article's abstract."""
+    """So does the abstract of the article."""
     words = (ROOT / "book" / "reading.md").read_text(encoding="utf-8").partition("These pages")[0]
     verdicts = {row["item"]: row["status"] for row in ROWS if row["item"].startswith("Eq.")}
     equal = sum(status == "derived, equal" for status in verdicts.values())
