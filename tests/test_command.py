@@ -666,6 +666,8 @@ def test_one_wrong_film_of_several(folder, ended):
         (BAC.replace("BAC", "BA"), 1, "has 3 tracks, --set 2 types"),
         ("fit-swing swing.txt --known perod=3", 1, "--known 'perod'; must be one of period, damp"),
         ("fit-swing swing.txt --known damping=-1", 1, "--known damping: -1.0; must be at least"),
+        ("fit-swing swing.txt --known gaps=0:1", 2, "--known gaps=0:1: write NAME=VALUE, once, wi"),
+        ("fit-swing swing.txt --known gaps=0 --known gaps=1", 2, "--known gaps=0 gaps=1: write NA"),
         ("fit-swing swing.txt --reading 0", 1, "cradle: --reading 0.0; must be above 0"),
         ("fit-swing swing.txt --scale 2", 2, "--position-unit px and --scale, pixels in a metre, "),
         ("fit-swing swing.txt --masses 1,2", 1, "--masses has 2 values; 3 balls need 3, or one n"),

@@ -548,6 +548,7 @@ def test_balls_are_in_the_order_of_the_titles(tmp_path):
     [
         ("a,b\n1,2\n3,4\n", "export.txt has no column of positions: a line of titles must begin"),
         ("", "export.txt has no column of positions"),
+        ("t,A/x,B/x\n", "export.txt has no marks below its titles"),
         ("t,y\n0,1\n", "export.txt has no column of positions"),
         (
             "t,A,B\n0,1,2\n",

@@ -84,6 +84,17 @@ def test_a_gap_that_closes_and_opens_within_a_step(beyond):
     assert [hit.time for hit in run.impacts] == pytest.approx(met, abs=1e-9)
 
 
+def test_balls_that_just_come_near_enough_to_touch_swing_on():
+    """Ball 1 is let go where it touches ball 2, comes back there at rest, and so on."""
+    times, gap = np.linspace(0, 3, 31), 1e-3
+    hang = {"length": 0.1, "gaps": gap, "angle": "full"}
+    run = swing(balls(2), SequentialCollisions(), [gap, 0], times, pendulums=Pendulums(**hang))
+    k, w = math.sin(gap / 0.1 / 2), math.sqrt(9.81 / 0.1)
+    sine = ellipj(ellipk(k * k) + w * times, k * k)[0]
+    np.testing.assert_allclose(run.positions[:, 0], 0.2 * np.arcsin(k * sine), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(run.positions[:, 1], 0, rtol=0, atol=1e-13)
+
+
 def test_a_ball_with_gaps_may_not_be_thrown_beyond_a_quarter_circle():
     hanging = Pendulums(0.3, gaps=1e-3, angle="full")
     with pytest.raises(RuntimeError, match=r"a ball that swung too far is 0\.48"):
@@ -526,6 +537,15 @@ def test_first_fall_is_the_first():
 )
 def test_a_root_next_to_the_start(terms, parting, root):
     assert first_fall(0.0, terms, parting, 10.0) == root
+
+
+@pytest.mark.parametrize("early", np.geomspace(1e-7, 0.02, 12).tolist())
+@pytest.mark.parametrize("radians", [1, 2])
+def test_a_root_at_the_end_of_a_radian(radians, early):
+    """The search goes radian by radian; before the end of one, the sum falls steeply."""
+    root, terms = radians - early, [(1 + 0j, 1j), (-5e-3 + 0j, 0.7j)]
+    level = 5e-3 * math.cos(0.7 * root) - math.cos(root)
+    assert first_fall(level, terms, False, 3.0) == pytest.approx(root, abs=1e-14)
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.1])

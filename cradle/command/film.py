@@ -168,9 +168,9 @@ def fit_swing(
     from cradle import fit as fits
 
     numbers = {name: value for name, (value, _) in map(named_number, known)}
-    law: cradle.Model = cradle.SequentialCollisions()
-    if ratio is not None:
-        law = cradle.ImpulseCorrelation(one_or_all(ratio), excess="saturate")
+    if len(numbers) < len(known) or ":" in "".join(known):
+        raise click.UsageError(f"--known {' '.join(known)}: write NAME=VALUE, once, with no error")
+    law = cradle.ImpulseCorrelation(one_or_all(ratio or [0.0]), excess="saturate")
     times, places = fits.frames(fits.read_tracker(file, **_units(**options)))
     found = fits.fit_swing(times, places, law, reading=reading, known=numbers, masses=masses)
     if plot is not None:

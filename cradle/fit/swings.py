@@ -155,7 +155,7 @@ class _Film:
         mean = np.average(self.x[:, some], axis=1, weights=self.balls.masses[some])
         mean, at = mean[np.isfinite(mean)], t[np.isfinite(mean)]
         if min(at.size, often.sum() // 3) < 10:
-            raise ValueError(f"{often.sum()} readings, {at.size} frames with all balls; too few")
+            raise ValueError(f"{often.sum()} readings, {at.size} full frames; needs 30 and 10")
         self.size = size = float(np.nanmax(np.abs(self.x)))
         if "period" not in self.fixed and np.std(mean) < 0.02 * size:
             raise ValueError("their mean rests, and tells no period: give known['period']")
@@ -235,7 +235,7 @@ class _Film:
         """Return the fit; or, if a profile finds a lower minimum, that."""
         freedom = left.size - int(self.seen.any(axis=0).sum()) - p.size
         grid, spread = np.full(self.seen.shape, np.nan), float(left @ left) / freedom
-        grid[self.seen] = left
+        grid[self.seen], spread = left, max(spread, (1e-15 * self.size) ** 2)  # it may be exact
         reading = self.reading or float(np.sqrt(spread))
         # Products of residuals of a ball some frames apart, up to a quarter of a swing.
         most = 2 + int(0.25 * self.period / self.times[-1] * len(grid))

@@ -86,12 +86,13 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
         else:
             above, block = cells, " ".join(cells).strip()
     tracks = {name: Track(*np.array(found).T) for name, found in marks.items() if found}
+    if not tracks and _owners(titles, above, block):
+        raise ValueError(f"{file.name} has no marks below its titles")
     if not tracks:
-        balls = [text for text, _ in titles[1:] if text]
-        hint = f"; if each column is a ball, write {'/x, '.join(balls)}/x" if balls else ""
-        rule = "a line of titles must begin with t or Time and name x too"
-        told = f"{file.name} has no column of positions: {rule}"
-        raise ValueError(f"{told}, as Tracker, Kinovea, Logger Pro and Capstone do{hint}")
+        balls = "/x, ".join(text for text, _ in titles[1:] if text)
+        told = f"{file.name} has no column of positions: a line of titles must begin with t or Time"
+        told += " and name x too, as Tracker, Kinovea, Logger Pro and Capstone do"
+        raise ValueError(told + f"; if each column is a ball, write {balls}/x" * bool(balls))
     for name, (times, _) in tracks.items():
         if (np.diff(times) <= 0.0).any():
             told = f"{file.name}: the times of {name} do not rise; where one ball follows the other"

@@ -72,9 +72,8 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
     def rise(time: Vector) -> Vector:  # from a start at zero, over the time: without that root
         return np.asarray((np.expm1(np.multiply.outer(time, rate)) @ c).real * radian / time)
 
-    noise = 4e-16 * (abs(level) + left)
-    # How far it may lie below its values at nodes, an eighth of a radian apart.
-    dip = float(size @ np.abs(rate) ** 2) * (radian / 8.0) ** 2 / 8.0
+    # How far it may lie below its values at nodes: beyond the last one; less between two of them.
+    dip = 0.5 * float(1.0 + _NODES[0]) * float(size @ np.abs(rate)) * radian
     for k in range(math.ceil(horizon / radian)):
         begin, told_by = k * radian, rise if parting and k == 0 else value
         values = told_by(begin + 0.5 * radian * (1.0 + _NODES))
@@ -84,7 +83,7 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
         roots = chebyshev.chebroots(chebyshev.chebtrim(terms, 1e-15 * np.abs(terms).max()))
         real = np.sort(roots.real[(roots.imag == 0.0) & (np.abs(roots.real) < 1.0)])
         marks = begin + 0.5 * radian * (1.0 + np.array([-1.0, *real, 1.0]))
-        below = told_by(0.5 * (marks[1:] + marks[:-1])) < -noise
+        below = told_by(0.5 * (marks[1:] + marks[:-1])) < -4e-16 * (abs(level) + left)
         if below.any():
             # A contact that is to part and does not closes a moment later.
             return float(marks[below.argmax()]) or TIE * radian * parting
@@ -218,7 +217,7 @@ class FullFlight:
         turned = map(zip, found.t_events[1:], found.y_events[1:])
         if missed := [t for one in turned for t, y in one if nearest(t, y) < 0.0]:
             found = self._integrate(min(missed), events=nearest)
-        if found.status == 0:
+        elif found.status == 0:
             return math.inf, [], []
         time, y = float(found.t[-1]), found.y[:, -1]
         gaps = self._apart(time, y)
