@@ -70,7 +70,7 @@
       const beside = this.parts.has("beside") ? panels.besidePanel(act) : null;
       this.panels = {
         scenes: ["scenes", "chains"].some((name) => this.parts.has(name))
-          ? panels.scenesPanel(act, this.parts)
+          ? panels.scenesPanel(act, this.parts, this.page && document.querySelector(".first-guess")?.textContent)
           : null,
         question: panels.questionPanel(act, this.host.dataset),
         run: panels.runPanel(act, this.parts),

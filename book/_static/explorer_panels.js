@@ -9,7 +9,7 @@
   // --- scenes: choose one, or walk through them -------------------------------------------------
 
   // In a chapter of them: the paper's chains alone.
-  function scenesPanel(act, parts) {
+  function scenesPanel(act, parts, first) {
     const { scenes } = explorer.data;
     const chains = parts.has("chains");
     const entries = (list) => list.map(({ key, title }) => ({ value: key, text: title }));
@@ -48,7 +48,9 @@
       const { text: said, link } = scenes[at] ?? { text: "" };
       const more = link ? [" ", make("a", { href: link.address }, link.words)] : [];
       // It tells the answer: it is there unseen, so that nothing below it moves when it comes.
-      text.replaceChildren(make("span", { class: "said-of-scene" }, said, ...more));
+      const words = [make("span", { class: "said-of-scene" }, said, ...more)];
+      if (first) words.push(make("span", { class: "first" }, first)); // before the first hit
+      text.replaceChildren(...words);
     }
     return { node: make("div", { class: "scenes" }, walk, chains ? "" : text), show };
   }
