@@ -441,6 +441,14 @@ def test_an_instant_comes_to_an_end(m, e, x, length, damping):
     assert np.diff(run.energy).max() <= 1e-12 * run.energy[0]
 
 
+@pytest.mark.parametrize("part", [1, 3e-5])
+def test_contacts_that_open_and_close_at_a_turning_point(part):
+    """Without restitution, forces of unequal dampings all change their sign where the row turns."""
+    hanging = Pendulums(0.15, damping=np.multiply(part, [0.6, 0.4, 0.5, 0.3]))
+    run = swing(balls(4, 0), SequentialCollisions(), pulled(4, by=0.05), [40], pendulums=hanging)
+    assert run.ended == "times"
+
+
 def test_balls_that_swing_alike_touch_all_the_time():
     """Balls 1 and 2 never part, so ball 3 strikes both: in one run, and handed over in two."""
     hanging, model = Pendulums(0.1, damping=[0, 0, 0.5]), ImpulseCorrelation(0.3)

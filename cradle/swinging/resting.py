@@ -10,7 +10,7 @@ The rules, in the order in which `swing` applies them at every event:
    are pooled while the left one would accelerate no less than the right one.  Equal pendulums
    without gaps swing alike, so they keep together, without a force, until a ball strikes them.
 4. *Pulling apart.* When the force in a contact of a body falls to zero, the contact opens, and
-   stays open for this instant, whatever else happens in it.
+   stays open for this instant, whatever else happens in it, and then until its balls meet.
 """
 
 import numpy as np

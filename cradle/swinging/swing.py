@@ -91,9 +91,8 @@ def swing(
     x, v = (np.concatenate(parts) for parts in zip(*run.series, strict=True))
     at = at[: len(x)]
     certify(run, at, x, v)
-    together = tuple(np.flatnonzero(run.together).tolist())
-    impacts, lasting = tuple(run.impacts), run.lasting
-    return Swing(chain, model, hanging, at, x, v, impacts, ended, run.t, together, lasting)
+    told = tuple(run.impacts), ended, run.t, tuple(np.flatnonzero(run.together).tolist())
+    return Swing(chain, model, hanging, at, x, v, *told, run.lasting)
 
 
 class _Run:
@@ -119,7 +118,7 @@ class _Run:
             told = f"balls {c} and {c + 1} overlap by {-distance[c]:g} m"
             raise ValueError(f"positions = {x.tolist()}; {told}")
         self.freed = np.full(n - 1, -math.inf)  # when the force in each contact last fell to zero
-        self.lasting = False
+        self.lasting, self.parting = False, (False,) * (n - 1)
         if isinstance(model, SpringChain):
             m, power = chain.masses, 1.0 / (model.exponent + 1.0)
             energy = m[:-1] / (m[:-1] + m[1:]) * m[1:] * self.speed**2
@@ -178,8 +177,9 @@ class _Run:
             self.t, self.x = self.t + duration, x
             touching = (self.gaps() == 0.0) & (v[1:] - v[:-1] >= -RESTING * self.speed)
         struck = self.v
-        self.freed[opening] = self.t  # what opens rests no more in this instant, whatever happens
-        kept = touching & (self.t - self.freed > hanging.tie)
+        parted = np.array(self.parting) & (struck[1:] > struck[:-1])  # these go on, if none closes
+        self.freed[opening], parted[closing] = self.t, False  # what opens rests no more just now
+        kept = touching & ~parted & (self.t - self.freed > hanging.tie)
         self.v, resting = common_velocities(hanging.masses, struck, kept, RESTING * self.speed)
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if np.count_nonzero(resting):
