@@ -3,6 +3,7 @@
 `python tests/built_book.py FOLDER` builds it there, unless somebody has begun to.
 """
 
+import shutil
 import subprocess
 import sys
 import time
@@ -13,6 +14,8 @@ ROOT = Path(__file__).parents[1]
 SHARED = "CRADLE_TESTS_SHARED"
 #: Seconds; on an idle machine it takes less than one minute.
 LONGEST = 1800
+#: Scripts that take seconds of a page: of icons, and of equations.
+HEAVY = "fontawesome.js", "tex-svg-full.js"
 
 
 def build(shared: Path) -> None:
@@ -35,10 +38,20 @@ def build(shared: Path) -> None:
             check=False,
         )  # fmt: skip
         text = "done" if done.returncode == 0 else done.stdout + done.stderr
+        if text == "done":
+            lighten(folder / "_build" / "html")
     finally:
         part = shared / "book.part"
         part.write_text(text, encoding="utf-8")
         part.replace(shared / "book.txt")
+
+
+def lighten(html: Path) -> None:
+    """Leave a copy of the pages beside them, `light`, with heavy scripts empty."""
+    light = shutil.copytree(html, html.with_name("light"))
+    for name in HEAVY:
+        (script,) = light.rglob(name)
+        script.write_bytes(b"")
 
 
 def built(shared: Path) -> Path:

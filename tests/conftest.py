@@ -132,14 +132,14 @@ def idle() -> dict[tuple, list]:
 @pytest.fixture
 def visit(browser, idle, html: Path):
     """What opens the explorer's page, or a chapter."""
-    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
+    with visiting(browser, idle, html) as visit:
         yield lambda *given, **options: Tab(visit(*given, **options))
 
 
 @pytest.fixture(scope="module")
 def linked(browser, idle, html: Path):
     """What follows a link on one page that tests share: those that look at a setting's answers."""
-    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
+    with visiting(browser, idle, html) as visit:
         tab = Tab(visit(reduced_motion="reduce"))
 
         def follow(fragment="scene=example"):

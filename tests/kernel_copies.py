@@ -4,6 +4,7 @@
 each, and answers with the number of its process.
 """
 
+import builtins
 import contextlib
 import gc
 import importlib
@@ -16,13 +17,15 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 from jupyter_client.provisioning import local_provisioner
 
 BOOK = Path(__file__).parents[1] / "book"
-#: What most chapters import, but pandas: at its import it looks whether it is in a notebook.
+#: What most chapters import.
 LOADED = (
-    "ipykernel.kernelapp", "matplotlib.pyplot", "scipy.integrate", "scipy.optimize", "sympy"
+    "ipykernel.kernelapp", "matplotlib.pyplot", "pandas", "scipy.integrate", "scipy.optimize",
+    "sympy",
 )  # fmt: skip
 
 
@@ -82,8 +85,11 @@ def load() -> None:
     sys.path.remove(str(Path(__file__).parent))
     os.chdir(BOOK)  # where matplotlib finds its settings
     os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"
+    # pandas asks at its import whether it is in a notebook.
+    builtins.get_ipython = lambda: SimpleNamespace(kernel=None)
     for name in LOADED:
         importlib.import_module(name)
+    del builtins.get_ipython
     importlib.import_module("cradle.runtime.job").warm_up()
     gc.freeze()  # collections would write to all that copies share
 

@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -129,7 +130,9 @@ def launched():
         pytest.skip("no Chromium on this machine")
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(
-            executable_path=command, args=["--no-sandbox"], timeout=PATIENCE
+            executable_path=command,
+            args=["--no-sandbox", "--renderer-process-limit=1"],  # none is begun ahead
+            timeout=PATIENCE,
         )
         yield browser
         browser.close()
@@ -140,43 +143,44 @@ def listened(tab) -> list[str]:
     faults = []
     tab.on("console", lambda said: said.type == "error" and faults.append(said.text))
     tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.on("request", lambda r: r.url.startswith(("file:", "data:")) or faults.append(r.url))
+    here = "file:", "data:", "blob:"
+    tab.on("request", lambda asked: asked.url.startswith(here) or faults.append(asked.url))
     return faults
 
 
 @contextlib.contextmanager
-def visiting(browser, idle: dict[tuple, list], home: str):
+def visiting(browser, idle: dict[tuple, list], html: Path):
     """Give what opens pages; at the end: no error on a console, no request that leaves the disk.
+
+    They are those without heavy scripts, unless `equations` are asked for.
 
     A new window takes three times as long as a new page in an old one: those that are `idle`, of
     each kind, are used again.
     """
     used = []
 
-    def window(stopped, plain, options):
+    def window(stopped, options):
         context = browser.new_context(**dict(options))
         context.set_default_timeout(PATIENCE)
         tab = context.new_page()
         if stopped:  # for dates, timers and frames alike; `tab.clock.run_for` lets time pass
             tab.clock.install(time=0)
             tab.clock.pause_at(10**6)
-        # Seconds go into equations, and into icons of the theme.
-        for script in ("fontawesome", *["tex-svg-full"] * plain):
-            tab.route(f"**/{script}.js*", lambda route: route.fulfill(body=""))
         return tab, listened(tab)
 
     def visit(
         fragment=None, *, chapter="explorer", width=1400, height=900, stopped=False,
         equations=False, color_scheme="light", reduced_motion="no-preference", **options,
     ):  # fmt: skip
-        kind = stopped, chapter != "explorer" and not equations, tuple(options.items())
+        kind = stopped, tuple(options.items())
         tab, faults = idle[kind].pop() if idle[kind] else window(*kind)
         used.append((kind, tab, faults))
         tab.set_viewport_size({"width": width, "height": height})
         tab.emulate_media(media="screen", color_scheme=color_scheme, reduced_motion=reduced_motion)
         if fragment is None:  # with a setting in the address nothing is covered
             fragment = "#scene=example" * (chapter == "explorer")
-        tab.goto(home.replace("explorer.html", f"{chapter}.html") + fragment)
+        pages = html if equations else html.with_name("light")
+        tab.goto((pages / "book" / f"{chapter}.html").as_uri() + fragment)
         if options.get("java_script_enabled", True):
             tab.wait_for_function(
                 "!document.querySelector('.cradle-explorer')"

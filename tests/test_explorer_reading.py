@@ -308,7 +308,11 @@ def test_keys_of_a_lecture_after_the_mouse(still):
         ".settings label[title='ball 2']": 0,
         ".pictures label:has-text('Each ratio')": 0,
     }
+    # After the first all keys, after each other those that it may have a use of its own for.
+    own = "ArrowRight", ".", "Space"
     for (selector, way), (key, state) in itertools.product(pressed_before.items(), done.items()):
+        if key not in own and selector != disc(0):
+            continue
         take(tab, "two")
         before = touch(tab, selector, way)
         tab.keyboard.press(key)

@@ -32,6 +32,9 @@ from cradle.pictures.impacts import PALETTE
 #: take long to load, and the weekly tests look at the other pairs.
 VIEWS = ((1280, "dark"), (360, "light"))
 OTHER_VIEWS = ((1280, "light"), (360, "dark"), (390, "light"), (390, "dark"))
+#: Pages of each kind.  On a desk in light colours others have nothing new but the bars at their
+#: sides, and those are the same on all pages.
+KINDS = {"explorer", "intro", "toy", "own_solver", "search", "genindex"}
 #: The window is low: only what is in it is painted.
 HEIGHT = 200
 #: Widths of phones; the smallest.
@@ -134,15 +137,16 @@ def looked_at(tab, page: Path, views) -> dict[str, list]:
     found["misfits"] += [cut for cut in tab.evaluate(MISFITS) if cut[0] in AS_IT_CAME]
     found["headings"], found["stops"] = tab.evaluate(SKIPPED), tab.evaluate(STOPS)
     tagged = re.search(r'\\tag|class="eqno"', page.read_text(encoding="utf-8"))
-    sights = {*views, (1280, "light"), (1280, "dark"), *((w, "light") for w in PHONES if tagged)}
+    pale = {*views, *((1280, mode) for mode in ("light", "dark") if page.stem in KINDS)}
+    sights = {*pale, *((width, "light") for width in PHONES if tagged)}
     # Each change takes long: first the light ones, narrow to wide, then the dark ones.
     for width, mode in sorted(sights, key=lambda sight: (sight[1] == "dark", sight)):
         show(tab, width, mode)
         if (width, mode) in views and page.parent.name == "book":
             found["misfits"] += [[width, mode, *misfit] for misfit in tab.evaluate(MISFITS)]
-        if width == 1280:
-            found["pale"] += [[mode, *pale] for pale in tab.evaluate(PALE, READABLE)]
-        elif tagged and mode == "light":
+        if (width, mode) in pale:
+            found["pale"] += [[width, mode, *cut] for cut in tab.evaluate(PALE, READABLE)]
+        if width != 1280 and tagged and mode == "light":
             found["numbers"] += [(width, *number) for number in tab.evaluate(NUMBERS)]
     return found
 
@@ -413,7 +417,7 @@ def test_folds_and_boxes(visit, html: Path):
     tab.wait_for_function("document.querySelector('.toggle-hidden :target') === null")
     for name, parts in (("own_code", ".copybtn"), ("own_solver", ".reader-solver button"),
                         ("toy", ".animation label")):  # fmt: skip
-        tab.goto((html / "book" / f"{name}.html").as_uri())
+        tab.goto((html.with_name("light") / "book" / f"{name}.html").as_uri())
         tab.wait_for_selector(parts)
         for part in tab.locator(parts).all():
             if part.is_visible():

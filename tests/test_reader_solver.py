@@ -104,7 +104,7 @@ class Editor:
 @pytest.fixture(scope="module")
 def page(browser, idle, html):
     """The page for all tests that do not ask how it begins: each has an editor of its own."""
-    with visiting(browser, idle, (html / "book" / "explorer.html").as_uri()) as visit:
+    with visiting(browser, idle, html) as visit:
         yield with_whole(Tab(visit(chapter="own_solver")))
 
 
