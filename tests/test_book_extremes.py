@@ -6,10 +6,11 @@ from decimal import Decimal, localcontext
 
 import extreme_chains as x
 import mpmath
+import nbformat
 import numpy as np
 import pytest
 from chains import uniform
-from chapters import Chapter, floats, number, points, shows
+from chapters import BOOK, Chapter, floats, number, points, shows
 from families import JUDGED, family
 from page import said
 from problem import Problem
@@ -18,6 +19,15 @@ from stored import read
 from cradle import Chain, ImpulseCorrelation, collide, outcomes, spring_velocities
 from cradle.measures import condition_number
 from cradle.textbook import solve
+
+
+def test_lessons_are_referred_to_by_their_numbers():
+    heads = (x.source for page in BOOK.glob("*.ipynb") for x in nbformat.read(page, 4).cells)
+    text = "\n".join(heads)
+    numbers = dict(re.findall(r"^\(([\w-]+)\)=\n## Lesson (\d)", text, flags=re.MULTILINE))
+    told = re.findall(r"[Ll]esson (\d)[^`<]*<([\w-]+)>", text)
+    assert len(told) > len(numbers) == 4
+    assert {(numbers[name], name) for _, name in told} == {*told}
 
 
 def stored(part, **equal):

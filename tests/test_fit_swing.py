@@ -292,7 +292,7 @@ PLACES = np.stack([-0.03 * np.cos(8 * WAYS), 0 * WAYS], axis=1)
         ({"known": {"gaps": -1e-5}}, r"known\['gaps'\] = -1e-05; must be at least 0"),
         ({"positions": PLACES[::-1] * 0.0}, "no ball is seen on its way"),
         ({"positions": PLACES - PLACES[:, ::-1]}, "rests, and tells no period: give known"),
-        ({"positions": 100 * PLACES}, "no swing is near the film; .* reach a quarter of a circle"),
+        ({"positions": 100 * PLACES}, "must be within .* a quarter of a circle; so no swing"),
         ({"times": 1000 * WAYS}, r"period that is seen, s, = 7\d\d.*; must lie in \[0.1, 30"),
         ({"positions": PLACES - [np.inf, 0]}, r"positions\[0, 0\] = -inf; must be finite, or nan"),
         ({"times": [], "positions": PLACES[:0]}, r"shapes \(0,\), \(0, 2\) and"),

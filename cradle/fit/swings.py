@@ -202,7 +202,7 @@ class _Film:
             return swing(chain, self.model, x, self.times[:count], pendulums=pendulums)
         except ValueError as reason:
             rule = "positions are from where each ball hangs, m, balls from left to right"
-            raise ValueError(f"no swing is near the film; {rule}; at last: {reason}") from reason
+            raise ValueError(f"{reason}; so no swing is near the film: {rule}") from reason
 
     def left(self, p: Vector, count: int | None = None) -> Vector:
         """Return what the swing by numbers leaves of the readings in these frames."""
