@@ -43,7 +43,7 @@ class ImpulseCorrelation:
         its right one drives its left one.  If `backward` is left out, it equals `forward`.
     meeting : float
         Two balls may be driven towards each other by separate collisions.  Their velocities meet at
-        this part, 0 to 1, of the overlap of their ranges up to the next events; 1/2 as in the paper.
+        this part, 0 to 1, of the overlap of their ranges to the next events; 1/2 as in the paper.
     excess : {"raise", "saturate"}
         What to do with a ratio above its bound (Eq. 53): refuse it, or hold the contact closed
         while the ratio would open it.
