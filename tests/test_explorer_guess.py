@@ -174,6 +174,22 @@ def test_the_cradle_stays_where_it_is_when_the_answer_comes(still, width):
     assert tab.evaluate(top) == before
 
 
+@pytest.mark.parametrize("width", [1100, 1400])
+def test_nothing_moves_on_a_desk_when_the_first_hit_opens_the_rest(still, width):
+    """What to do first is told once, where the words on the scene will come."""
+    tab = still("", width=width)
+    tab.drawn()
+    told = tab.locator(".first:visible, .first-guess:visible")
+    top = "document.querySelector('.cradle').getBoundingClientRect().top"
+    before = tab.evaluate(top)
+    (words,) = told.all_inner_texts()
+    assert words.startswith("First guess")
+    tab.act("step()")
+    tab.drawn()
+    assert not told.count()
+    assert (tab.evaluate(top), tab.evaluate("scrollY")) == (before, 0)
+
+
 def test_pictures_wait_after_a_hit_that_was_guessed(still):
     """So that the guess can be compared; the balls rest a little, then they swing on."""
     tab = still(chapter="intro", stopped=True)

@@ -177,6 +177,7 @@ def seen(request, html: Path, browser):
             found[page.stem] = looked_at(tab, page, views) | {"said": said.copy()}
     context.close()
     assert len(found) > 25
+    assert found.keys() > KINDS
     return found
 
 
@@ -249,7 +250,8 @@ def test_coloured_letters_of_figures_can_be_read(html: Path):
         for colour in LETTERS_OF_FIGURES.findall(path.read_text(encoding="utf-8")):
             if book_figures.spread(colour) > book_figures.COLOURFUL:
                 found.add((colour, ground))
-                assert contrast(colour, ground) >= READABLE, (path, colour)
+                least = READABLE if ground == "#ffffff" else 5.9
+                assert contrast(colour, ground) >= least, (path, colour)
     assert len(found) > 10
 
 
