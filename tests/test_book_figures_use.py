@@ -122,6 +122,32 @@ def test_fig_measure_tracks():
         assert drawn_slope == slope
 
 
+def test_fig_measure_swing():
+    """Marks of the film; a line through them; and how late gaps make it, from strike to strike."""
+    figure = drawn("measure", ("setup", "phone", "track-call", "swing-fit", "fig-swing"))
+    ax = figure["fig-measure-swing"].axes[0]
+    marks, fit, without = (line.get_xydata().T for line in ax.get_lines())
+    table = np.loadtxt(DATA / "swing_synthetic.txt", skiprows=3, encoding="utf-8")
+    off = marks[1] - 1000 * table[:, 1]
+    np.testing.assert_allclose(marks[0], table[:, 0])
+    np.testing.assert_allclose(off, off[0])  # from where it hangs
+    seen = marks[1][:-1] - np.interp(marks[0][:-1], *fit)
+    assert np.std(seen) < 0.35  # mm; marks are off by 0.3
+    assert np.std(marks[1][:-1] - np.interp(marks[0][:-1], *without)) > 1
+    # Each strike crosses four gaps of 80 um; it ends with `e**4` and the damping of its swing.
+    speed, late = 0.03 * 2 * math.pi / 0.8, 0.0
+    for _ in range(14):
+        speed *= math.exp(-0.02 * 0.2)
+        for _ in range(4):
+            speed *= (1 + 0.985) / 2
+            late += 80e-6 / speed
+        speed *= math.exp(-0.02 * 0.2)
+    turn = [x[0][(x[0] > 5.2)][x[1][x[0] > 5.2].argmin()] for x in (fit, without)]
+    (told,) = (re.search(r"(\d+) ms", x.get_text())[1] for x in ax.texts if "ms" in x.get_text())
+    assert f"{1000 * (turn[0] - turn[1]):.0f}" == told == Chapter("measure").glued["swing-late"]
+    assert 1000 * late == pytest.approx(int(told), abs=3)
+
+
 @pytest.mark.parametrize(
     ("figure", "printed"),
     [
