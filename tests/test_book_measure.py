@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 import real_cradles
-from chapters import BOOK, Chapter, floats
+from chapters import BOOK, Chapter, floats, number
 from commands import call, film_of_lifted
 from scipy.special import gammaincc, ndtri
 from scipy.stats import norm
@@ -132,6 +132,15 @@ def test_prediction_of_a_longer_row():
     off = (after - speed * median) / np.hypot(error, median * sigma_before[:, :1])
     said = re.findall(r"\d+", RATIOS.printed("check-how"))
     assert [int(x) for x in said] == pytest.approx([np.square(off).sum(), off.size], abs=4.5)
+
+
+def test_intervals_hold_what_made_the_shots():
+    made = {"AB": 0.53, "AC": 0.31, "ABA": 0.127, "BAC": 0.088, "CAB": 0.499, "ACA": 0.262}
+    found = RATIOS.printed("show-pairs") + RATIOS.printed("show-ratios")
+    told = re.findall(r"(?m)^\w+ (\w+) = [\d.]+ \[([\d.]+), ([\d.]+)\]", found)
+    held = [float(low) <= made.pop(name) <= float(high) for name, low, high in told]
+    assert not made
+    assert (number(RATIOS.glued["inside"]), number(RATIOS.glued["intervals"])) == (sum(held), 6)
 
 
 def test_gaps_that_one_speed_does_not_tell_apart_and_another_speed_does():
