@@ -4,7 +4,7 @@ import gaps
 import numpy as np
 import pytest
 from chains import HERTZ
-from chapters import Chapter
+from chapters import Chapter, drawn
 from stored import numbers, read
 
 from cradle import (
@@ -80,6 +80,13 @@ def test_what_the_chapter_says():
     assert sorted(chain, key=rms.get, reverse=True) == chain
     assert rms["with_own_quotient"] < rms["stiffness_of_pair"] / 2 < rms["one_ratio"] / 2
     *few, gap, quotient = (line.split()[-1] for line in CHAPTER.printed("scored").splitlines()[2:])
+    (ax,) = drawn("table_2", ("setup", "fig-scored"))["fig-table-2-scored"].axes
+    assert [f"{bar.get_width():g}" for bar in ax.patches] == [*few, gap, quotient]
+    bars = [bar.get_y() + bar.get_height() / 2 for bar in ax.patches]
+    named = zip(ax.get_yticks(), (x.get_text() for x in ax.get_yticklabels()), strict=True)
+    printed = [line.rsplit(maxsplit=4)[0] for line in CHAPTER.printed("scored").splitlines()[2:]]
+    assert [name for _, name in named] == printed
+    np.testing.assert_allclose(ax.get_yticks(), bars)
     assert gap == str(sum(row["with_own_gap"] <= 0.05 for row in rows))
     assert quotient == str(sum(row["with_own_quotient"] <= 0.05 for row in rows))
     assert int(quotient) > 55
