@@ -131,6 +131,27 @@ def test_figures_show_their_column_of_a_table(figure, part, column):
     assert shows(figures[figure].axes, values)
 
 
+def test_fig_maps_jumps():
+    """Each number stands in the row and column of its masses and ratio; of 20 balls all are 0."""
+    rows = stored("unequal")
+    assert {r["jumps"] for r in rows if r["balls"] == "20" or float(r["ratio"]) < 0.25} == {"0"}
+    unknown = [int(r["unfinished"]) for r in rows if int(r["unfinished"]) > 12]
+    assert [int(glued["unknown"])] == unknown
+    assert int(glued["unfinished"]) == sum(int(r["unfinished"]) for r in rows)
+    for ax, balls in zip(MAPS.figures["fig-maps-jumps"].axes, ("40", "80"), strict=True):
+        assert ax.get_title() == f"{balls} balls"
+        shown = {tuple(x.get_position()): x.get_text() for x in ax.texts}
+        ratios = ["0.1", "0.2", "0.3", "0.45"]
+        names = [x.get_text() for x in ax.get_yticklabels()]
+        for r in (r for r in rows if r["balls"] == balls):
+            (row,) = (k for k, name in enumerate(names) if r["family"].startswith(name + ",")
+                      or r["family"] == name)  # fmt: skip
+            told = "?" if int(r["unfinished"]) > 12 else r["jumps"]
+            assert shown.pop((ratios.index(r["ratio"]), row)) == told
+        assert not shown
+    assert [x.get_text() for x in ax.get_xticklabels()] == ratios
+
+
 def test_fig_extremes_map_shows_the_fewest_digits():
     axes = MAPS.figures["fig-maps-digits"].axes[:4]
     for ax, shape in zip(axes, ("middle", "striker", "last", "taper"), strict=True):
