@@ -13,6 +13,7 @@ from chains import ELASTIC, HERTZ
 from chapters import Chapter, floats, numbers, points, shows
 from dop853 import integrated
 from measured_table import find, fused, sequential, table
+from page import said
 from scenes import random_chains
 from stored import read
 from truth import solve
@@ -70,6 +71,20 @@ def test_fig_trade_stiffness_two_sweeps_on_one_curve():
     assert compared >= 5
     percent = [r["parameter"] for r in find("stiffness") if r["numerical_error"] <= 1e-2]
     assert 0.1 <= max(percent) <= 0.6
+    told = ENGINES_PAGE.glued
+    assert told["steps"] == said(round(np.pi / max(percent)))
+    by_step = [r for r in find("penalty", model="penalty, linear") if r["parameter"] <= 0.1]
+    softer = [r for r in find("stiffness") if r["numerical_error"] <= 1e-2]
+    most = max(abs(r["energy_change"]) for r in by_step + softer)
+    assert told["energy-then"] == f"{100 * most:.1f}"
+    assert most == pytest.approx(0.01, rel=0.5)
+    (ax,) = ENGINES_PAGE.figures["fig-trade-stiffness"].axes
+    steps = np.concatenate([line.get_xdata() for line in ax.get_lines()[:2]])
+    expected = [
+        np.exp(np.log(np.pi) - phase),
+        np.pi / floats(r["parameter"] for r in find("stiffness")),
+    ]
+    np.testing.assert_allclose(np.sort(steps), np.sort(np.concatenate(expected)), rtol=1e-9)
 
 
 def test_engines_all_are_measured():
