@@ -147,7 +147,7 @@ def test_fig_maps_jumps():
             (row,) = (k for k, name in enumerate(names) if r["family"].startswith(name + ",")
                       or r["family"] == name)  # fmt: skip
             told = "?" if int(r["unfinished"]) > 12 else r["jumps"]
-            assert shown.pop((ratios.index(r["ratio"]), row)) == told
+            assert shown.pop((ratios.index(r["ratio"]) + 0.5, row + 0.5)) == told
         assert not shown
     assert [x.get_text() for x in ax.get_xticklabels()] == ratios
 
