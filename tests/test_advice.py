@@ -406,3 +406,12 @@ def test_refusals_say_what_to_give():
             recommend(chain, accuracy=1e-15, stiffness=1)
         least = float(re.search(r"ask for (\S+) or more", str(refused.value)).group(1))
         assert recommend(chain, accuracy=least, stiffness=1).numerical_error <= least
+
+
+def test_a_refusal_names_what_a_model_lacks_and_nothing_that_it_has():
+    wanted = ("velocities", "impulses", "times")
+    with pytest.raises(ValueError, match="ask for") as refused:
+        recommend(THREE, wanted, accuracy=1e-15, ratios=0.1, stiffness=1e10, impacts=100)
+    told = str(refused.value)
+    assert "ImpulseCorrelation has no times, " in told
+    assert "spring_velocities has no impulses and times; " in told

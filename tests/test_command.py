@@ -686,6 +686,7 @@ def test_one_wrong_film_of_several(folder, ended):
         ("fit shots.csv --known ABA=1.2", 1, "cradle: --known ABA: 1.2; must lie in [0, 1]"),
         ("fit shots.csv --predict ABA --csv", 2, "--csv prints the fitted values alone"),
         ("fit shots.csv --summary --csv", 2, "give one of --summary, --json and --csv"),
+        ("fit grams.csv --json --csv", 2, "Error: give one of --json and --csv"),
         ("fit shots.csv --speed 2", 2, "--speed is that of the chain to --predict; give both"),
         ("fit exact.csv", 1, "line 2, column sigma = 0.0; must be above 0"),
         ("fit shots.csv --sigma 0.01", 1, "--sigma 0.01; the table has a column sigma: leave out"),

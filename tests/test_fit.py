@@ -33,7 +33,7 @@ from cradle.fit import (
     velocities_from_tracks,
 )
 from cradle.fit.parameters import chi_squares, pair_keys, ratio_keys, triplet_keys
-from cradle.fit.result import FOLDED, Group
+from cradle.fit.result import FOLDED, SKEW, Group
 from cradle.fit.search import RISE, refine, scan
 from cradle.fit.tracks import Track
 
@@ -81,6 +81,8 @@ def good():
         (lambda t: t["ball"].__setitem__(1, 1.5), "row 2, column ball: 1.5; must be 1, 2"),
         (lambda t: t["mass"].__setitem__(2, 0.05), "row 3, column mass: 0.05; balls of type A"),
         (lambda t: t["type"].__setitem__(3, "C"), "row 4, column type: 'C'; ball 2 of set AB"),
+        (lambda t: t["type"].__setitem__(1, "A-2"), "row 2, column type: 'A-2'; must be a name wi"),
+        (lambda t: t["type"].__setitem__(0, ""), "row 1, column type: ''; must be a name without -"),
         (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
         (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma = 0.0; must be above 0"),
         (lambda t: t["mass"].__setitem__(0, -0.045), "row 1, column mass = -0.045; must be above"),
@@ -107,6 +109,25 @@ def test_sigma_is_given_once():
     assert read_shots(table, sigma=errors[0])["AB"].sigma.tolist() == [errors[:2], errors[2:]]
     with pytest.raises(ValueError, match=r"^sigma = -1.0; must be above 0"):
         read_shots(table, sigma=-1)
+
+
+def test_a_missing_error_is_left_out():
+    """Empty cells of a file are NaN in a DataFrame of pandas."""
+    table = pd.DataFrame(good() | {"sigma_before": [0.02, None, np.nan, pd.NA]})
+    assert read_shots(table)["AB"].sigma_before.tolist() == [[0.02, 0.0], [0.01, 0.0]]
+
+
+@pytest.mark.parametrize("name", ["a;b", 'a "b" c', "a\tb", "d'or"])
+def test_names_may_have_the_signs_of_other_tables(tmp_path, name):
+    """The header tells what stands between the columns."""
+    pd.DataFrame(good() | {"set": name}).to_csv(tmp_path / "named.csv", index=False)
+    assert read_shots(tmp_path / "named.csv").sets[0].name == name
+
+
+def test_a_quote_that_is_not_closed_is_refused_by_its_line(tmp_path):
+    pd.DataFrame(good() | {"set": "a\nb"}).to_csv(tmp_path / "broken.csv", index=False)
+    with pytest.raises(ValueError, match=r"^line 2: 1 values; the header has 8 columns"):
+        read_shots(tmp_path / "broken.csv")
 
 
 def test_a_repeated_column_is_refused(tmp_path):
@@ -759,6 +780,23 @@ def test_a_set_that_is_no_bell_curve_is_said():
         found = ratio(shots, pairs_of(name, 0.0), known=known)
         assert found[name].folded == folded
         assert (FOLDED in found.summary()) == folded
+
+
+@pytest.mark.parametrize(("e", "sigma"), [(0.97, 0.02), (0.02, 0.02), (0.8, 0.05)])
+def test_a_bell_curve_that_the_range_cuts_off_is_one(e, sigma):
+    """Twenty fits of one pair near an end of its range: nothing is said of their sets."""
+    random, sides = np.random.default_rng(7), []
+    for _ in range(20):
+        after = [(1.0 - e) / 2.0, (1.0 + e) / 2.0] + sigma * random.standard_normal(2)
+        table = {"set": "AA", "shot": 1, "ball": [1, 2], "type": "A", "mass": 1.0}
+        table |= {"before": [1.0, 0.0], "after": np.sort(after), "sigma_before": 0.0}
+        shots = read_shots({k: np.broadcast_to(x, 2) for k, x in table.items()}, sigma=sigma)
+        found = restitution(shots)
+        (low, high), value = found["AA"].intervals[0], found["AA"].value
+        sides.append((value - low) / (high - value or 1.0))
+        assert not found["AA"].folded
+        assert FOLDED not in found.summary()
+    assert max(sides) > SKEW or min(sides) < 1.0 / SKEW  # the range does cut them off
 
 
 def test_predictions_cover():

@@ -157,8 +157,7 @@ def recommend(
     like = chain if len({*np.ravel(stiffness or 1.0)}) == 1 else None
     elastic = bool((chain.restitution == 1.0).all())
     wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness, like, elastic)
-    found = []
-    failures: dict[str, list[str]] = {}
+    found, failures = [], dict[str, list[str]]()
     for group, make in _models(wish).items():
         try:
             found.append(_best(group, make, wish))
@@ -260,7 +259,8 @@ def _best(
                   and (wish.impacts > 1 or "batch" not in row.setting)
                   and not (wish.elastic and "lossy" in row.chains[0]))  # fmt: skip
     if not found:
-        raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(gives))}")
+        lacks = gives.difference(*(row.gives for row in rows(group))) or gives
+        raise _Unfit(f"wanted = {wish.wanted!r}", f"{name} has no {' and '.join(sorted(lacks))}")
     # What a model refuses it refuses now: the same balls at rest cost it no work.
     springs = group in ("springs", "many springs")
     e = 1.0 if springs else chain.restitution  # springs have their viscosity
@@ -284,9 +284,7 @@ def _best(
         known = "was not measured here" if apart is None else f"is {apart:.2g}"
         raise _Unfit(f"model_error = {wish.model_error!r}", f"that of {name} {known}")
     measured = where != "elsewhere"
-    kind = group
-    if springs:
-        kind = "timed" if {"forces", "times"} & set(wish.wanted) else "springs"
+    kind = ("timed" if {"forces", "times"} & gives else "springs") if springs else group
     if springs and not wish.elastic:
         kind, chain = "lossy", Chain(chain.masses, chain.velocities)
     return (not measured, row.seconds), Recommendation(

@@ -5,6 +5,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,16 @@ import click
 
 
 def format_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of `show`."""
-    as_csv = click.option("--csv", "as_csv", is_flag=True, help="Print the table as CSV.")
-    as_json = click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
-    return as_json(as_csv(command))
+    """Add the options of `show`, of which one may be given."""
+
+    def alone(context: click.Context, _: click.Parameter, given: bool) -> bool:
+        if given and (context.params.get("as_csv") or context.params.get("as_json")):
+            raise click.UsageError("give one of --json and --csv")  # before any work
+        return given
+
+    flag = partial(click.option, is_flag=True, callback=alone)
+    as_csv = flag("--csv", "as_csv", help="Print the table as CSV.")
+    return flag("--json", "as_json", help="Print everything as JSON.")(as_csv(command))
 
 
 def show(
@@ -24,8 +31,6 @@ def show(
 ) -> None:  # fmt: skip
     """Print a table, as text with a note, as CSV, or as JSON with all there is."""
     names = names or list(rows[0])
-    if as_json and as_csv:
-        raise click.UsageError("give one of --json and --csv")
     if as_json:
         click.echo(json.dumps({"rows": list(rows), **extra}, indent=2))
     elif as_csv:
@@ -49,10 +54,8 @@ def _texts(column: Sequence[Any]) -> list[str]:
         # Unions of intervals: two digits of the narrowest one can be told apart.
         widths = [high - low for pieces in column for low, high in pieces if high > low]
         decimals = min(12, max(4, 1 - math.floor(math.log10(min(widths, default=1.0)))))
-        return [
-            " or ".join(f"{low:.{decimals}f}-{high:.{decimals}f}" for low, high in pieces)
-            for pieces in column
-        ]
+        return [" or ".join(f"{low:.{decimals}f}-{high:.{decimals}f}" for low, high in pieces)
+                for pieces in column]  # fmt: skip
     floats = [abs(value) for value in column if isinstance(value, float) and math.isfinite(value)]
     largest = max(floats, default=0.0) or 1.0
     decimals = max(4, 3 - math.floor(math.log10(largest)))
@@ -67,9 +70,8 @@ def _texts(column: Sequence[Any]) -> list[str]:
 
 def _plain(value: Any) -> Any:
     """Return a value for a cell of CSV; a union of intervals as `0.1..0.2; 0.5..0.6`."""
-    if not isinstance(value, tuple):
-        return value
-    return "; ".join(f"{low!r}..{high!r}" for low, high in value)
+    whole = not isinstance(value, tuple)
+    return value if whole else "; ".join(f"{low!r}..{high!r}" for low, high in value)
 
 
 def picture(_: click.Context, __: click.Parameter, path: str | None) -> str | None:

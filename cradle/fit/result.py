@@ -70,18 +70,15 @@ class Estimate:
         """
         if self.value is None or self.at_bound:
             return False
-        near = self.grid[self.excess <= 4 * RISE]  # twice as far as the set reaches
+        ends = (self.excess[self.grid == x].min() for x in (self.grid.min(), self.grid.max()))
+        most = float(min(4 * RISE, *ends))  # twice as far as the set reaches, or to an end
+        near = self.grid[self.excess <= most]
         sides = self.value - float(near.min()), float(near.max()) - self.value
-        return len(self.intervals) > 1 or max(sides) > SKEW * min(sides)
+        return len(self.intervals) > 1 or (max(sides) > SKEW * min(sides) and most > RISE)
 
     def row(self) -> dict[str, Any]:
         """Return the row of this estimate in a table."""
-        row = (self.name, self.kind, self.value, self.intervals, len(self.modes), self.identified,
-               self.at_bound, self.bound)  # fmt: skip
-        return dict(zip(RESULT_COLUMNS, row, strict=True))
-
-    def __str__(self) -> str:
-        return self.told()
+        return {n: len(self.modes) if n == "minima" else getattr(self, n) for n in RESULT_COLUMNS}
 
     def told(self, times: float = 1.0, unit: str = "") -> str:
         """Return value and confidence set as text; in a smaller unit, so many times as large."""
@@ -93,6 +90,8 @@ class Estimate:
         sets = " or ".join(f"[{a * times:{form}}, {b * times:{form}}]" for a, b in self.intervals)
         end = f" at its {self.at_bound} bound" if self.at_bound else ""
         return f"{self.kind} {self.name} = {self.value * times:{form}} {sets}{unit}{end}"
+
+    __str__ = told
 
 
 class Group(NamedTuple):

@@ -164,8 +164,7 @@ def read_shots(
     if sigma is not None:
         one_number("sigma", sigma, *ABOVE_ZERO)
         if "sigma" in there:
-            rule = "the table has a column sigma: leave out one of them"
-            raise ValueError(f"sigma = {sigma!r}; {rule}")
+            raise ValueError(f"sigma = {sigma!r}; the table has a column sigma: leave out one")
     units = {"mass_unit": mass_unit, "velocity_unit": velocity_unit}
     for option, unit in units.items():
         one_of(option, unit or next(iter(_UNITS[option][0])), list(_UNITS[option][0]))
@@ -208,11 +207,13 @@ def _number(where: str, line: dict[str, Any], name: str, units: dict[str, str | 
 def _row(where: str, line: dict[str, Any], units: dict[str, str | None]) -> _Row:
     """Return one row in kg and m/s."""
     row: _Row = {"where": where, **{n: str(line[n]).strip() for n in ("set", "shot", "type")}}
-    told = line.get("sigma_before") not in (None, "")
+    told = str(line.get("sigma_before", "")) not in ("", "None", "nan", "<NA>")
     for name in ("ball", "mass", "before", "after", "sigma", *["sigma_before"] * told):
         row[name] = _number(where, line, name, units)
     if row["ball"] < 1 or row["ball"] % 1:
         _refuse(where, "ball", f"{line['ball']!r}; must be 1, 2, ... from the left")
+    if not row["type"] or "-" in row["type"]:
+        _refuse(where, "type", f"{row['type']!r}; must be a name without -, which joins types")
     return {"sigma_before": row["sigma"] if row["before"] else 0.0, **row, "ball": int(row["ball"])}
 
 
@@ -233,8 +234,7 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
                 _refuse(row["where"], "type", f"{row['type']!r}; ball {row['ball']} of set "
                         f"{name} has {usual['type']!r} elsewhere")  # fmt: skip
         _check_physics(what, rows)
-    types = "".join(row["type"] for row in first)
-    rest = name.removeprefix(types)
+    rest = name.removeprefix(types := "".join(row["type"] for row in first))
     if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
         _refuse(first[0]["where"], "set", f"set {name} has the balls {types} alone; is the row of "
                 f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip

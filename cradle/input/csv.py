@@ -50,7 +50,8 @@ def text_rows(name: str, content: bytes | str, comments: bool = False) -> dict[i
         if line.strip(",; \t") and not line.startswith("sep=")  # for a spreadsheet
         and (comments or not line.lstrip().startswith("#"))
     }  # fmt: skip
-    mark = next((one for one in "\t;," if any(one in line for line in lines.values())), " ")
+    seen = "".join([*lines.values()][: None if comments else 1])  # a table's header; all of a film
+    mark = next((one for one in "\t;," if one in seen), " ")
     if mark != ",":
         comma = next((n for n, line in lines.items() if re.search(r",\d", line)), None)
         point = next((n for n, line in lines.items() if re.search(r"\d\.\d", line)), None)
@@ -58,5 +59,5 @@ def text_rows(name: str, content: bytes | str, comments: bool = False) -> dict[i
             told = f"decimals with a comma in line {comma} and with a point in line {point}"
             raise ValueError(f"{name} has {told}; write all with a point")
         lines = {number: re.sub(r",(?=\d)", ".", line) for number, line in lines.items()}
-    rows = csv.reader(lines.values(), delimiter=mark, skipinitialspace=True)
-    return dict(zip(lines, ([cell.strip() for cell in row] for row in rows), strict=True))
+    return {number: [cell.strip() for row in csv.reader([line], delimiter=mark,
+            skipinitialspace=True) for cell in row] for number, line in lines.items()}  # fmt: skip
