@@ -82,7 +82,7 @@ def good():
         (lambda t: t["mass"].__setitem__(2, 0.05), "row 3, column mass: 0.05; balls of type A"),
         (lambda t: t["type"].__setitem__(3, "C"), "row 4, column type: 'C'; ball 2 of set AB"),
         (lambda t: t["type"].__setitem__(1, "A-2"), "row 2, column type: 'A-2'; must be a name wi"),
-        (lambda t: t["type"].__setitem__(0, ""), "row 1, column type: ''; must be a name without -"),
+        (lambda t: t["type"].__setitem__(0, ""), "row 1, column type: ''; must be a name withou"),
         (lambda t: t["before"].__setitem__(0, -1.0), "row 1, column before: .*no balls approach"),
         (lambda t: t["sigma"].__setitem__(2, 0.0), "row 3, column sigma = 0.0; must be above 0"),
         (lambda t: t["mass"].__setitem__(0, -0.045), "row 1, column mass = -0.045; must be above"),
