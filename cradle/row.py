@@ -186,8 +186,7 @@ class Row(Alone):
         # The speed of the step, whether its kick comes first, last, or half and half.
         taken = self.taken(x, own + early, duration)
         speeds = own + self.lag * (self.own(v, now) + taken - early - own)
-        bent = self._pull(x) - self._pull(now)
-        speeds += self.lag * (1.0 - self.lag) * duration * bent
+        speeds += self.lag * (1.0 - self.lag) * duration * (self._pull(x) - self._pull(now))
         change, _, hits = self.fly(x, speeds, duration) or (-taken, early, [])
         asked = change - early + taken
         self._push(asked, now)

@@ -101,6 +101,23 @@ def test_wrong_tables_are_refused_by_row_and_column(change, message):
         read_shots(table)
 
 
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda _: restitution("shots.csv"), "shots is a str; must be a Shots"),
+        (lambda _: ratio(None, {"AB": 0.5}), "shots is a NoneType; must be a Shots"),
+        (lambda shots: ratio(shots, 0.53), "restitution is a float; must be a Mapping"),
+        (
+            lambda shots: ratio(shots, {"AB": 0.5}, known=[0.1]),
+            "known is a list; must be a Mapping",
+        ),
+    ],
+)
+def test_wrong_types_are_refused_by_name(call, message):
+    with pytest.raises(TypeError, match=f"^{message}$"):
+        call(read_shots(columns("ABA", [1.0], outcome("ABA"), 0.01)))
+
+
 def test_sigma_is_given_once():
     table = good()
     with pytest.raises(ValueError, match=r"sigma = 0.01; the table has a column sigma: leave out"):

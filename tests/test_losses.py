@@ -89,6 +89,11 @@ def test_viscous_balls_part_as_contact_forces_say(exponent, u):
         assert ViscousLoss(**balls)(u) == pytest.approx((right - left) / u, abs=3e-9)
 
 
+def test_one_mass_is_that_of_both_balls():
+    one, two = (ViscousLoss(**STEEL | {"viscosity": 1e-7, "masses": m}) for m in (0.1, [0.1] * 2))
+    assert one == two
+
+
 def test_a_viscous_ball_may_be_too_fast():
     law = ViscousLoss(2e-5, **STEEL)
     assert 0.5 < law(1e-2) < law(1e-3) < 1

@@ -214,6 +214,14 @@ LAWS = [
     (SpeedDependent, (SequentialCollisions(), 0.9), "restitution = 0.9; must be a law e(u)"),
     (ConstantLoss(0.1), (0,), "u = 0.0; must be above 0"),
     (ViscousLoss(1e-6, masses=[1, 1], stiffness=1e9), (-1,), "u = -1.0; must be above 0"),
+    *(
+        (ViscousLoss, {"viscosity": 0, "stiffness": 1, "masses": masses}, f"masses{words}")
+        for masses, words in (
+            ([1, 2, 1], " has 3 values; 2 balls need 2, or one number"),
+            ([1, -1], "[1] = -1.0; must be above 0"),
+            ([1, 1e-200], "[1] = 1e-200; must be at least 1e-150 of the heaviest"),
+        )
+    ),
     (SpeedDependent, (3, ConstantLoss(0.1)), "model is an int; must be an impact model"),
     *(
         (struck, (SpeedDependent(SequentialCollisions(), law),), f"restitution(u)[0] = {words}")

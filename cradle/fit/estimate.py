@@ -11,7 +11,7 @@ from cradle.fit.parameters import Key, fitted_keys, label, pair_keys, parameter_
 from cradle.fit.result import Estimate, Fit, Group
 from cradle.fit.search import refine, scan
 from cradle.fit.shots import Shots, ShotSet
-from cradle.input.values import PART, Vector, checked, flag, one_number
+from cradle.input.values import PART, Vector, checked, flag, must_be, one_number
 from cradle.kernel.state import LIMITS
 
 _TRIALS = 513  # points at which it is tried whether a ratio acts at all
@@ -33,7 +33,8 @@ def restitution(shots: Shots) -> Fit:
     chi-square 0.8, degrees of freedom 3, chance 0.85
     residuals of AB: 0.4 standard errors, the largest 0.6 (shot 1, ball 1)
     """
-    pairs = sorted(pair_keys(one.types)[0] for one in shots.sets if len(one.types) == 2)
+    sets = must_be(Shots, "shots", shots).sets
+    pairs = sorted(pair_keys(one.types)[0] for one in sets if len(one.types) == 2)
     if not pairs:
         raise ValueError("no set has two balls; restitution comes from pairs")
     return _fitted(shots, "restitution", dict.fromkeys(pairs, 1.0), {}, {}, int)
@@ -74,13 +75,13 @@ def ratio(
     >>> fit.predict("ABA")
     Prediction(ABA: 0.129 [0.110, 0.148], 0.243 [0.230, 0.256], 0.585 [0.571, 0.600] m/s)
     """
-    sets = [one for one in shots.sets if len(one.types) > 2]
+    sets = [one for one in must_be(Shots, "shots", shots).sets if len(one.types) > 2]
     if not sets and known is None:
         raise ValueError("no set has three balls or more; ratios come from triplets")
     from tqdm import tqdm
 
     given, fixed, masses = _restitution_values(restitution, sets), dict[Key, float](), shots.masses
-    for triplet, value in (known or {}).items():
+    for triplet, value in must_be(Mapping, "known", known or {}).items():
         key, name = parameter_key(triplet), f"known[{triplet!r}]"
         fixed[key] = one_number(name, value, *PART)
         if len(key) == 3 and masses.keys() >= set(key):  # it is to be held
@@ -97,8 +98,9 @@ def _restitution_values(
     given: Fit | Known, sets: Sequence[ShotSet]
 ) -> dict[Key, tuple[float, float]]:
     """Return the coefficients and their errors by pair; all that the sets need are there."""
+    told = given.values() if isinstance(given, Fit) else must_be(Mapping, "restitution", given)
     values = {}
-    for pair, value in (given.values() if isinstance(given, Fit) else given).items():
+    for pair, value in told.items():
         key, name = tuple(sorted(parameter_key(pair))), f"restitution[{pair!r}]"
         numbers = np.atleast_1d(checked(name, value)).tolist()
         if len(numbers) not in (1, 2):
@@ -163,18 +165,17 @@ def _fitted(
         return parameters.chi_squares(members, values, uncertain)
 
     found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
-    groups, chi_square, freedom = [], 0.0, 0
+    groups, chi_square, freedom = list[Group](), 0.0, 0
     for keys in _together(fitted_keys(one.types) & acting for one in sets):
         members = [one for one in sets if fitted_keys(one.types) & {*keys}]
         search = refine if len(keys) > 1 else scan
         upper = np.array([bounds[key] for key in keys])
         scans, points, density, lowest = search(partial(chi, keys, members), upper)
-        groups.append(Group(tuple(keys), points, density))
+        groups += [Group(tuple(keys), points, density)] * (kind == "ratio")
         for key, one in zip(keys, scans, strict=True):
             found[label(key)] = Estimate.of(kind, key, bounds[key], one)
         chi_square += lowest
         freedom += sum(one.after.size for one in members) - len(keys)
-    together = tuple(groups) if kind == "ratio" else ()
     named = {label(key): value for key, value in given.items()}
     held = {label(key): value for key, value in fixed.items()}
-    return Fit(shots, found, named, together, chi_square, freedom, held)
+    return Fit(shots, found, named, tuple(groups), chi_square, freedom, held)

@@ -90,8 +90,7 @@ def refine(function: Function, upper: Vector) -> Found:
     # Points that no neighbour undercuts, among those near the lowest.
     some = order[:1500][values[order[:1500]] - values.min() <= 4 * RISE]
     near = np.all(np.abs(points[some, None] - points[None, some]) < 1.5 * step, axis=-1)
-    lower = values[some][None, :] < values[some][:, None]
-    lows = points[some[~np.any(near & lower, axis=1)]]
+    lows = points[some[~np.any(near & (values[some] < values[some][:, None]), axis=1)]]
     each, lowest = _walked(function, lows, np.broadcast_to(step, lows.shape), upper)
     excess = values - lowest
     scans = []

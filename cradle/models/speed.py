@@ -103,7 +103,7 @@ class ViscousLoss:
     ----------
     viscosity, stiffness, exponent : float
         A in s, k in N/m^p, and p, as for `spring_velocities`.
-    masses : sequence of two floats
+    masses : float or sequence of two floats
         Masses of the two balls, kg.
 
     Examples
@@ -122,7 +122,8 @@ class ViscousLoss:
         law = SpringChain(self.stiffness, self.exponent, viscosity=self.viscosity)
         for name in ("stiffness", "exponent", "viscosity"):
             vars(self)[name] = asked.one_number(name, getattr(law, name))
-        vars(self)["masses"] = tuple(Chain(self.masses, np.zeros(2)).masses.tolist())
+        m = asked.row_of("masses", asked.number_or_row("masses", self.masses, "2"), 2, 2)
+        vars(self)["masses"] = tuple(asked.checked_masses(m).tolist())
 
     def __call__(self, u: float) -> float:
         """Return e at the closing speed u, m/s, above 0; ValueError if A is too large for u."""
