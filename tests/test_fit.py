@@ -757,6 +757,20 @@ def test_a_ball_at_rest_before_and_after(noise):
     assert (found.sigma > 0).all()
 
 
+def test_tracks_may_be_lists_and_are_asked():
+    """Of two lists, of arrays, or as a file has them; a mark that is no number is named."""
+    tracks = read_tracker(DATA / "video_synthetic.txt")
+    lists = {name: Track(*map(np.ndarray.tolist, ball)) for name, ball in tracks.items()}
+    found, told = (velocities_from_tracks(t, length=0.3) for t in (tracks, lists))
+    assert all(map(np.array_equal, found[:5], told[:5]))
+    for wrong, message in (
+        ([0.1] * 48, r"tracks\['A'\]\[1\] has shape \(48,\), tracks\['A'\]\[0\] has \(49,\)"),
+        ([np.nan] * 49, r"tracks\['A'\]\[1, 0\] = nan; must be finite"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            velocities_from_tracks(lists | {"A": Track(lists["A"].times, wrong)}, length=0.3)
+
+
 def test_correlations_are_those_of_the_ellipse():
     """A likelihood on a grid against the inverse of its matrix."""
     matrix = 1e4 * np.array([[2.0, 1.2], [1.2, 3.0]])

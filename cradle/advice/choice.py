@@ -267,8 +267,7 @@ def _best(
     make(found[0].parameter).solve(Chain(chain.masses, 0.0 * chain.velocities, e))
     where, settings = evidence(found, wish.like, wish.ratios if group == "event" else None)
     # A chain among the measured ones can be worse than each of them, by a few times.
-    margin = 1.0 if where == "here" else 10.0
-    errors = [margin * (row.numerical_error or 0.0) for row in settings]
+    errors = [(1.0 if where == "here" else 10.0) * (row.numerical_error or 0.0) for row in settings]
     if min(errors) > wish.accuracy:
         least = settings[int(np.argmin(errors))]
         told = f"the least numerical error of {name} measured is {least.numerical_error:.2g}"

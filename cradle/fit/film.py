@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from cradle.fit.tracks import Track
-from cradle.input.values import ABOVE_ZERO, Vector, one_number, whole_number
+from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number, whole_number
 from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
@@ -67,6 +67,7 @@ def velocities_from_tracks(
     >>> velocities_from_tracks(tracks, length=0.3, window=0.05).sigma.round(3).tolist()
     [0.009, 0.009, 0.009]
     """
+    tracks = {name: Track(*checked(f"tracks[{name!r}]", ball)) for name, ball in tracks.items()}
     balls = list(tracks.values())
     if len(balls) < 2:
         raise ValueError(f"{len(balls)} tracks; needs two balls and more")
