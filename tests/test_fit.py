@@ -830,6 +830,15 @@ def test_a_bell_curve_that_the_range_cuts_off_is_one(e, sigma):
     assert max(sides) > SKEW or min(sides) < 1.0 / SKEW  # the range does cut them off
 
 
+@pytest.mark.parametrize("e", [0.0, 0.01, 0.5, 0.99, 1.0])
+def test_an_error_is_no_smaller_where_the_range_cuts_the_set_off(e):
+    """Equal balls part with e: velocities (1 - e)/2 and (1 + e)/2 tell it to sigma times root 2."""
+    table = {"set": "AA", "shot": 1, "ball": [1, 2], "type": "A", "mass": 1.0, "sigma_before": 0.0}
+    table |= {"before": [1.0, 0.0], "after": [(1.0 - e) / 2.0, (1.0 + e) / 2.0]}
+    shots = read_shots({k: np.broadcast_to(x, 2) for k, x in table.items()}, sigma=0.01)
+    assert restitution(shots)["AA"].standard_error == pytest.approx(0.01 * 2**0.5, rel=1e-6)
+
+
 def test_predictions_cover():
     """A chain of five from pairs and triplets, 12 times: the truth is nearly always inside."""
     truth, inside = outcome("ABABA"), []

@@ -117,10 +117,8 @@ class _Search:
     def __post_init__(self) -> None:
         """Ask each set once: its different starts, who has which, and the errors of the factor."""
         self.starts = [np.unique(one.before, axis=0, return_inverse=True) for one in self.sets]
-        self.errors = [
-            np.abs(one.sigma_before / np.where(one.before, one.before, np.inf)).max(axis=1)
-            for one in self.sets
-        ]
+        self.errors = [np.abs(s.sigma_before / np.where(s.before, s.before, np.inf)).max(axis=1)
+                       for s in self.sets]  # fmt: skip
 
     def numbers(self, z: Vector) -> dict[str, float]:
         """Return the numbers by name."""
@@ -204,9 +202,7 @@ class _Search:
             ends.append(self.descend(np.array(z), every))
         low, high = (self.numbers(np.array(span)) for span in spans)
         intervals = {name: (low[name], high[name]) for name in self.ranges}
-        values, *others = (
-            {k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in found.items()}
-            for found in (self.numbers(np.round(end, 9)) for end in minima)
-        )
+        values, *others = ({k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in
+                            self.numbers(np.round(end, 9)).items()} for end in minima)  # fmt: skip
         left = {one.name: x[:, :-1] for one, x in zip(self.sets, self.left(minima[0]), strict=True)}
         return LawFit(values, intervals, tuple(others), left, lowest, self.freedom)

@@ -59,8 +59,12 @@ class Estimate:
 
     @property
     def standard_error(self) -> float:
-        """Total length of the confidence set over 3.92, which is right for a bell curve."""
-        return sum(high - low for low, high in self.intervals) / (2.0 * float(np.sqrt(RISE)))
+        """Length of the confidence set over 3.92; a side cut off by the range is as the other."""
+        length = sum(high - low for low, high in self.intervals)
+        inner = [end for ends in self.intervals for end in ends if 0.0 < end < self.bound]
+        if self.value is not None and len(inner) == 1:
+            length = max(length, 2.0 * abs(inner[0] - self.value))
+        return length / (2.0 * float(np.sqrt(RISE)))
 
     @property
     def folded(self) -> bool:
