@@ -493,7 +493,10 @@ def test_data_of_the_bound_end_there(name):
         ({"AB": 1.3}, None, "must lie in"),
         ({"AB": (0.3, -0.1)}, None, r"restitution\['AB'\]\[1\] = -0.1; a standard error"),
         ({"AB": (0.3, 0.1, 0.1)}, None, "must be a number, or a number and its error"),
-        ({"AB": 0.3}, {"ABA": 1.3}, r"known\['ABA'\] = 1.3; must lie in"),
+        ({"AB": 0.3}, {"ABA": 1.3}, r"known\['ABA'\] = 1.3; must be 0 to the bound"),
+        ({"AB": 0.3}, {"ABA": -0.1}, r"known\['ABA'\] = -0.1; must be 0 to the bound"),
+        ({"AB": 0.3}, {"AAC": 0.1}, r"known\['AAC'\]; must name three of the balls A, B"),
+        ({"AB": 0.3}, {"AB": 0.1}, r"known\['AB'\]; must name three of the balls A, B"),
     ],
 )
 def test_missing_knowledge_is_named(given, known, message):

@@ -72,7 +72,7 @@ def test_pairs_with_what_is_known_predict_longer_chains():
 def test_a_known_ratio_is_one_number_up_to_its_bound():
     table, bound = read_shots("shots.csv"), 0.045 / 0.098
     assert ratio(table, {"AB": 0.53}, known={"ABA": bound}).known == {"ABA": bound}
-    for wrong, words in ((bound + 1e-6, "must not exceed the bound"), ((0.1, 0.2), "one number")):
+    for wrong, words in ((bound + 1e-6, "must be 0 to the bound"), ((0.1, 0.2), "one number")):
         with pytest.raises(ValueError, match=rf"known\['ABA'\] = .*; must .*{words[-9:]}"):
             ratio(table, {"AB": 0.53}, known={"ABA": wrong})
 

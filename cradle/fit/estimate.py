@@ -83,11 +83,11 @@ def ratio(
     given, fixed, masses = _restitution_values(restitution, sets), dict[Key, float](), shots.masses
     for triplet, value in must_be(Mapping, "known", known or {}).items():
         key, name = parameter_key(triplet), f"known[{triplet!r}]"
-        fixed[key] = one_number(name, value, *PART)
-        if len(key) == 3 and masses.keys() >= set(key):  # it is to be held
-            bound = _bound(key, masses)
-            rule = f"must not exceed the bound of these balls, {bound:.6g} (Eq. 34)"
-            one_number(name, value, rule, high=bound * LIMITS.rounded)
+        if len(key) != 3 or not masses.keys() >= set(key):
+            raise ValueError(f"{name}; must name three of the balls {', '.join(masses)}")
+        bound = _bound(key, masses)
+        rule = f"must be 0 to the bound of these balls, {bound:.6g} (Eq. 34)"
+        fixed[key] = one_number(name, value, rule, 0.0, bound * LIMITS.rounded)
     bounds = {key: _bound(key, masses)
               for one in sets for key in ratio_keys(one.types) if key not in fixed}  # fmt: skip
     with tqdm(unit=" points", delay=2.0, disable=not flag("progress", progress)) as bar:
