@@ -99,9 +99,12 @@ def test_fig_extremes_edge():
 
 
 def test_exercises():
-    """Masses 1, 1/4, 1: tan of the angle is 3/4, and 180 / 36.87 is 4.88; a border by trace."""
+    """Masses 1, 1/12, 1: tan of the angle is 5/12, and 180 / 22.62 is 7.96; a border by trace."""
+    assert math.sqrt(1 / 12 * 25 / 12) == pytest.approx(5 / 12, rel=1e-15)
+    assert number(glued["twelfth"]) == math.ceil(math.pi / math.atan(5 / 12)) - 1 == 7
+    # The figure has masses 1, 1/4, 1, and tan 3/4.
     assert math.sqrt(0.25 * 2.25) == 0.75
-    assert number(glued["quarter"]) == math.ceil(math.pi / math.atan(0.75)) - 1 == 4
+    assert math.ceil(math.pi / math.atan(0.75)) - 1 == 4
     dots = points(MAPS.figures["fig-maps-wedge"].axes[0], marker="o")[0]
     assert len(dots) == 4  # the walls that the path crosses
     assert glued["border-times"] == f"{1 / x.infinite_below(0.9):.0f}"
