@@ -32,6 +32,15 @@ def test_rows_are_those_of_numpy():
             assert found == work(np.array(one), np.array(y)).tolist(), act
     for work in (operator.add, operator.sub, operator.mul):
         assert work(2.0, solver_numpy.array(one)) == work(2.0, np.array(one)).tolist()
+    for act in ("iadd", "isub", "imul", "itruediv"):
+        for y in (other, 2.0):
+            row, true = solver_numpy.array(one), np.array(one)
+            held, right = row, true
+            row = getattr(operator, act)(row, y)
+            true = getattr(operator, act)(true, y)
+            assert row is held, act  # as in numpy, whoever holds the row sees the change
+            assert true is right
+            assert (row, type(row)) == (true.tolist(), solver_numpy.Row), act
     row = solver_numpy.array([3, 1, 2], dtype=float)
     assert (row[1:], type(row[1:]), -row) == ([1, 2], solver_numpy.Row, [-3, -1, -2])
     assert solver_numpy.where(row > 1, row, 0) == np.where(np.array(row) > 1, row, 0).tolist()

@@ -36,7 +36,7 @@ TOLD = {
         "2 u and slope of both contacts",
         "3 way_to_stop, twice: the nearer",
         "4 Work, and with it owed",
-        "5 tau, v; a row of path",
+        "5 New tau, v (no +=); a row of path",
         "6 Next phase; who drives",
     ),
 }

@@ -13,6 +13,16 @@ def each(act):
     return method
 
 
+def in_place(act):
+    """Return the method of +=, -=, *= or /=: as in numpy, it changes the row itself."""
+
+    def method(self, other):
+        self[:] = act(self, other)
+        return self
+
+    return method
+
+
 class Row(list):
     """An array of one dimension."""
 
@@ -33,6 +43,10 @@ class Row(list):
     __le__ = each(lambda x, y: x <= y)
     __gt__ = each(lambda x, y: x > y)
     __ge__ = each(lambda x, y: x >= y)
+    __iadd__ = in_place(__add__)
+    __isub__ = in_place(__sub__)
+    __imul__ = in_place(__mul__)
+    __itruediv__ = in_place(__truediv__)
 
     def copy(self):
         """Return the same numbers in a row of their own."""

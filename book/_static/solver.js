@@ -6,6 +6,7 @@
   const { texts, calls, checks } = data;
   const PYTHON = document.currentScript.src.replace(/solver\.js.*/, "solver_python.js");
   const SAME = 1e-9; // m/s
+  const MOST = 12; // numbers of a row that are shown
   const LONG = 4000; // milliseconds after which a run may be endless
 
   function make(kind, attributes = {}, ...children) {
@@ -26,7 +27,8 @@
     }));
 
   const shown = (v) => (v === null ? "no number" : Number.isFinite(v) ? String(+v.toPrecision(6) + 0) : "inf");
-  const row = (values) => values.map(shown).join(", ").replaceAll("-", "\u2212");
+  const row = (values) =>
+    values.slice(0, MOST).map(shown).join(", ").replaceAll("-", "\u2212") + (values.length > MOST ? ", \u2026" : "");
   const rows = (all) => all.map(row).join("; ");
   const numbers = (text) => JSON.parse(text.replace(/-?nan/g, "null").replaceAll("inf", "1e999"));
   const same = (v, w) => v === w || (v !== null && Math.abs(v - w) <= SAME);
