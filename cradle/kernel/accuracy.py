@@ -184,8 +184,8 @@ def judge(n, law, change, s, clock):
     finer = max(off * SPARE, 1.5) if compare else off * SPARE
     if off <= 1.0:
         finer = math.sqrt(2.0) if clock.lossy or (ratio == 0.0 and not clock.leans) else 2.0
-        if not clock.leans:  # else two runs agree that left out the same, and amplified that
-            clock.slow /= finer * finer * finer * finer
+    if compare and off <= 2.0 and not clock.leans:
+        clock.slow /= finer * finer * finer * finer  # runs agree that left out the same, amplified
     clock.coarser = clock.h if off <= (1.0 if clock.leans else 2.0) else 0.0
     clock.h /= finer
     clock.trial += 1

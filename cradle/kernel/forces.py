@@ -319,10 +319,10 @@ def run(n, law, effort, s, clock, record):
         clock.top, clock.stiff = max(clock.top, stiff), stiff
         a, z = s[low], s[high - 1]
         # Before kinks are paid: one that is watched from now on gets its part, but of no past.
-        if high < n - 1 and z.f > 0.0 and (lossy or z.d > slow):
+        if high < n - 1 and z.f > 0.0 and (lossy or z.d > slow or right - s[high + 1].v > slow):
             bring(s[high], time - s[high].seen, right - s[high + 1].v, h)
             high += 1
-        if low > 0 and a.f > 0.0 and (lossy or a.d > slow):
+        if low > 0 and a.f > 0.0 and (lossy or a.d > slow or s[low - 1].v - left > slow):
             low -= 1
             bring(s[low], time - s[low].seen, s[low].v - left, h)
         if kinks > 0:

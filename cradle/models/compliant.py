@@ -35,9 +35,9 @@ class SpringChain:
     """Balls on massless springs (equations 7-11): the contact forces, followed in time.
 
     The laws of force are those of `spring_velocities`.  In the trace, `absorbed` is the energy that
-    a contact stores at each maximum of its compression, less that at a minimum between two maxima.
+    a contact stores at each maximum of its compression, less that at the start or minimum before.
     Speeds below ``accuracy / 100`` of the fastest closing speed count as none, so how often balls
-    touch very gently depends on the accuracy.
+    touch very gently depends on the accuracy.  From impulses the pull of strings is taken off.
 
     Parameters
     ----------
@@ -89,10 +89,9 @@ class SpringChain:
             from tqdm import tqdm
 
             with tqdm(unit=" steps", delay=2.0) as bar:
-                found = follow(row, law, out, pause=lambda steps: bar.update(steps - bar.n))
+                _, status, clock = follow(row, law, out, pause=lambda k: bar.update(k - bar.n))
         else:
-            found = follow(row, law, out)
-        _, status, clock = found
+            _, status, clock = follow(row, law, out)
         if status == REFUSED:
             raise refused(clock, law, [], row)
         if status == UNSOUND:
@@ -225,9 +224,8 @@ def spring_outcomes(
         check_rows(arrays)
         row = Springs(*(rows_of(array, lead, slice(at, at + 1)) for array in arrays))
         place = [int(k) for k in np.unravel_index(at, lead)]
-        _, status, clock = follow(row, law, motions(1, n))
         if status == REFUSED:
-            raise refused(clock, law, place, row)
+            raise refused(follow(row, law, motions(1, n))[2], law, place, row)
         # Alone, it stops where it stopped here, and raises.
         m, v, k, loss, gap = (values[0] for values in row)
         model = SpringChain(k, p, viscosity=loss, gaps=gap, damping=damping, accuracy=accuracy)

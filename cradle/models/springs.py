@@ -161,6 +161,7 @@ class Path:
         u = v[:, :-1] - v[:, 1:]
         rate, damping = slope * u, grip * u
         v[1:] -= h**2 / 12.0 * self.driven(rate)[1:]
+        v[-1] = self.last  # also where pulls ended within the last step
         self.v, self.force = v, np.maximum(push + damping, 0.0)
         self.a = self.driven(held + damping)
 
@@ -182,18 +183,19 @@ class Path:
         from scipy.interpolate import CubicHermiteSpline as Cubic  # slow to import
 
         self.collisions = self.closed[0].astype(np.int64)
-        self.durations, self.absorbed = np.zeros((2, len(self.k)))
-        if len(self.t) == 1:
-            return self.t, (), self.v, self.force
-        closing = np.diff(self.closed.astype(int), axis=0)
+        self.durations = np.zeros(len(self.k))
         u, grow = -np.diff(self.v), -np.diff(self.a)
-        touching = np.minimum.accumulate(self.y, axis=0) >= -1e-12
+        self.absorbed = 0.0 - self.pushes(self.y[0]) * self.y[0] * (u[0] > 0.0) / (self.p + 1.0)
+        closing = np.diff(self.closed.astype(int), axis=0)
+        again, late, later = self.y[:-1] > 0.0, self.y + self.early * u, u + self.early * grow
+        touching = np.minimum.accumulate(np.where(self.closed, -1.0, self.y), axis=0) >= -1e-12
         turned = ((u[:-1] > 0.0) != (u[1:] > 0.0)) & (self.closed[:-1] | self.closed[1:])
         where = []
         for kind, wanted, x, rate in (
             ("maximum_compression", turned, u, grow),
-            ("end", closing < 0, self.y + self.early * u, u + self.early * grow),
-            ("close", closing > 0, self.y, u),
+            ("end", closing < 0, late, later),
+            ("close", (closing > 0) & again, late, later),  # losses had opened it
+            ("close", (closing > 0) & ~again, self.y, u),
         ):
             for j, c in np.argwhere(wanted).tolist():
                 two, began = slice(j, j + 2), kind == "close" and touching[j, c]
@@ -220,7 +222,7 @@ class Path:
             if shown:
                 found.append((t, Event(kind, c), v, push))
         at, events, path, force = map(list, zip(*found, strict=True))
-        path[-1] = self.v[-1] = self.last  # also where pulls ended within the last step
+        path[-1] = self.last
         return np.array(at), tuple(events[1:]), np.array(path), np.array(force)
 
 
