@@ -132,10 +132,12 @@
       if (error && line) mark(line);
       if (!done) return;
       const passed = list.querySelectorAll(".passed").length;
+      const missed = single.querySelectorAll(".missed").length;
+      const but = missed ? `, but ${missed} of ${first.length} calls failed` : "";
       if (empty) {
         reveal(false);
         stop(`Write your lines at line ${line}.`);
-      } else stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed.`);
+      } else stop(error ? `An error${line ? ` in line ${line}` : ""}.` : `${passed} of ${checks.length} checks passed${but}.`);
     }
     // The line of an error is selected, so that it is seen.
     function mark(line) {
