@@ -165,6 +165,8 @@ def test_two_clicks_from_the_landing_page_to_any_item(html: Path, root: Path, ch
 def test_pages_say_what_a_link_to_them_may_show(html: Path, chapters):
     for path, text in chapters.items():
         assert re.search(r'property="og:title" content="[^<"]+"', text), path
+        (told,) = re.findall(r'property="og:description" content="([^"]*)"', text)
+        assert "&lt;" not in told, path  # no tags
         picture = re.search(r'property="og:image" content="[^"]*/(_static/[^"]+)"', text)
         assert (html / picture[1]).is_file()
 

@@ -382,7 +382,7 @@ def describe(
     if doctree is None:
         return
     title, text = (
-        next((node.astext() for node in doctree.findall(kind)), "")
+        next((_words(node) for node in doctree.findall(kind)), "")
         for kind in (nodes.title, nodes.paragraph)
     )
     properties = {
@@ -394,6 +394,15 @@ def describe(
     context["metatags"] = context.get("metatags", "") + "".join(
         f'\n<meta property="{name}" content="{escape(value, quote=True)}" />'
         for name, value in properties.items()
+    )
+
+
+def _words(node: nodes.Element) -> str:
+    """Return the text of a node, without the tags of HTML in it."""
+    return "".join(
+        text.astext()
+        for text in node.findall(nodes.Text)
+        if not isinstance(text.parent, nodes.raw)
     )
 
 
