@@ -63,6 +63,17 @@ def test_the_page_s_lines_pass(solver, monkeypatch):
         np.testing.assert_allclose(found, check["expected"], atol=1e-12)
 
 
+def test_who_drives_matters_where_both_contacts_approach(solver):
+    """The page asks which check fails if 2-3 drives at the start."""
+    names: dict = {}
+    assert solver.count("v, tau, owed)], 0\n") == 1
+    exec(solver.replace("v, tau, owed)], 0\n", "v, tau, owed)], 1\n"), names)
+    for check in reader_solver.checks(reader_solver.cells()):
+        before = check["given"][1]
+        off = np.abs(names["three_balls"](*check["given"])[-1][2] - check["expected"]).max()
+        assert (off > 0.05) == (before[0] > before[1] > before[2]) == (off > 1e-12)
+
+
 def test_a_piece_is_left_to_the_reader(solver):
     texts = reader_solver.texts(reader_solver.cells())
     assert texts.pop("") == {"own": solver, "rest": ""}
