@@ -111,8 +111,9 @@ class Row(Alone):
         if missing := [x for x in ("motion", "push", "advance") if not hasattr(bodies, x)]:
             what = f"bodies is {a(type(bodies).__name__)} without {', '.join(missing)}"
             raise TypeError(f"{what}; must be an adapter with motion, push and advance")
-        x = bodies.motion()[0]
+        x, v = bodies.motion()
         super().__init__(x, chain, model, radii, pivots, touching, resting, acceleration)
+        self._plane("motion: velocities", v)
         self.bodies = bodies
         self.on_hit: Callable[[Hit], object] | None = None
         self.impacts, self.time = 0, 0.0
@@ -242,9 +243,8 @@ class Row(Alone):
         if fast.any():
             self._doubts = self._doubts + 1 if (np.abs(mean[fast]) > 1.5 * speed[fast]).all() else 0
         if self._doubts > 2:
-            rule = "rows of one world are stepped together, by cradle.row.step_rows"
-            told = f"the world moves on between the steps of this row; {rule}"
-            raise RuntimeError(f"{told}, and by nobody else")
+            rule = "call wake after moving it; rows are stepped together, by cradle.row.step_rows"
+            raise RuntimeError(f"the world moves on between the steps of this row; {rule}")
         # Near the turning points the lag is seen: the kicks are in proportion to the pulls.
         first, second = self._pull(was).real, self._pull(x).real
         seen = (gained > 0.05 * speed) & (np.abs(first) > 0.05 * self.acceleration)

@@ -460,6 +460,54 @@ def test_radii_that_do_not_fit_the_places_of_the_balls_are_told(hung: float):
     assert all(one.filename == __file__ for one in told)
 
 
+@pytest.mark.parametrize("angle", [-0.9, -1.5])
+def test_a_short_string_may_be_lifted_beside_a_long_one(angle: float):
+    """The line to the last ball then leans so far that the longer string's pivot lies behind."""
+    lengths = np.array([0.1, 0.3])
+    pivots = np.column_stack([[0.0, 0.04], lengths])
+    arms = lengths[:, None] * np.array([[math.sin(angle), -math.cos(angle)], [0.0, -1.0]])
+    bodies = Free(pivots + arms, np.zeros((2, 2)), [1, 1])
+    along = bodies.x[1] - bodies.x[0]
+    assert (pivots[1] - pivots[0]) @ along < 0
+    row = Row(bodies, Chain([1, 1], [0, 0]), MODEL, 0.02, pivots)
+    bodies.x = pivots - np.column_stack([[0.0, 0.0], lengths])
+    bodies.v[0, 0] = 1.0
+    row.step(1e-6)
+    assert row.impacts == 1
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ([[1, 0, 0], [0, 0, 0]], r"velocities has shape \(2, 3\); 2 balls need \(2, 2\)"),
+        ([1, 0], r"velocities has shape \(2,\)"),
+        ([[1, 0]], r"velocities has shape \(1, 2\)"),
+        ([[1, 0], [None, 0]], r"motion: velocities\[1, 0\] = None; must be a real number"),
+        ([[1, 0], [math.nan, 0]], r"motion: velocities\[1, 0\] = nan; must be finite"),
+    ],
+)
+def test_velocities_that_are_none_of_a_plane_are_refused_at_once(told, message):
+    bodies = Free([[0, 0], [0.2, 0]], np.zeros((2, 2)), [1, 1])
+    bodies.motion = lambda: (bodies.x.tolist(), told)
+    with pytest.raises(ValueError, match=message):
+        Row(bodies, Chain([1, 1], [0, 0]), MODEL, RADIUS)
+
+
+def test_a_ball_that_a_hand_moves_unsaid_is_told_of_wake():
+    """Each frame a hand carries the ball on, faster than the velocity that it leaves with it."""
+    bodies = Hanging([-0.5, 0.0, 0.0])
+    row = hung(bodies)
+
+    def carry():
+        for _ in range(20):
+            bodies.angles[0] -= 0.02
+            bodies.rates[0] = -0.3
+            row.step(1 / 60)
+
+    with pytest.raises(RuntimeError, match="between the steps of this row; call wake after"):
+        carry()
+
+
 class Colliding(Hanging):
     """An engine that foresees contacts, as Rapier does, and collides the balls of the row too."""
 

@@ -76,14 +76,13 @@ class Alone:
         #: How fast neighbours may come to close; 0 on equal strings: these are accelerated alike.
         self.speeding = self.acceleration
         if self.pivots is not None:
-            back = (np.diff(self.pivots) / (at[-1] - at[0])).real < 0.0
-            if back.any():
-                ball = int(np.argmax(back)) + 1
-                rule = "on the way from the first ball to the last; must be in the order of the row"
-                raise ValueError(f"pivots[{ball}] lies behind pivots[{ball - 1}] {rule}")
             lengths = self.arms(at)
+            low = np.diff(self.pivots - 1j * lengths)  # unequal strings end at unequal heights
+            for c in np.flatnonzero((low / (at[-1] - at[0])).real < 0.0)[:1].tolist():
+                rule = "on the way from the first ball to the last; must be in the order of the row"
+                raise ValueError(f"pivots[{c + 1}] lies behind pivots[{c}] {rule}")
             self.speeding *= np.ptp(lengths) > 1e-3 * lengths.min()
-            apart = np.abs(np.diff(self.pivots - 1j * lengths))
+            apart = np.abs(low)
             for c in np.flatnonzero(np.abs(apart - self.reach) > _MISFIT * apart)[:1].tolist():
                 sizes = f"radii[{c}] + radii[{c + 1}] = {self.reach[c]:g}"
                 rule = f"should be within a tenth of {apart[c]:g}, as far as these balls hang apart"
