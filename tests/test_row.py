@@ -6,7 +6,15 @@ import warnings
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
+from cradle import (
+    Chain,
+    FusedChain,
+    ImpulseCorrelation,
+    Pendulums,
+    SpringChain,
+    collide,
+    swing,
+)
 from cradle.row import Row, step_rows
 from cradle.runtime import compile as runtime
 
@@ -135,6 +143,19 @@ def test_three_strikers_have_gaps_at_the_first_stroke_only():
     np.testing.assert_allclose(ends[0][2:], 1, atol=0.01)
     assert ends[1][0] > 1.07
     assert ends[1][2] < 0.93
+
+
+@pytest.mark.parametrize("rate", [60, 500])
+def test_balls_that_hang_side_by_side_move_as_one_body(rate: int):
+    """In an engine they never have quite the same velocity, as this law demands."""
+    angles = [-0.5, 0.0, 0.0, 0.0, 0.0]
+    bodies = Hanging(angles)
+    row = hung(bodies, model=FusedChain())
+    hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
+    run = swing(Chain([1] * 5, [0] * 5), FusedChain(), angles, [10.0], pendulums=hanging)
+    steps(row, 10 * rate, 1 / rate)
+    assert row.impacts == len(run.impacts) == 10
+    assert np.abs(bodies.angles - run.positions[-1]).max() < 5e-3
 
 
 SHORT = 0.2

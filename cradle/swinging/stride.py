@@ -198,7 +198,8 @@ class Alone:
             masses, before = self.chain.masses[balls] / along**2, (v[balls] / axis).real
             after = before
             if (before[:-1] - before[1:] > self.resting).any():
-                chain = Chain(masses, before, self.chain.restitution[first : last - 1])
+                alike, _ = common_velocities(masses, before, still[first : last - 1], self.resting)
+                chain = Chain(masses, alike, self.chain.restitution[first : last - 1])
                 with without_waiting():
                     after = collide(chain, part(self.model, len(x), first, last)).velocities
                 impulses = np.cumsum(masses * (before - after))[:-1]
