@@ -158,6 +158,18 @@ def test_balls_that_hang_side_by_side_move_as_one_body(rate: int):
     assert np.abs(bodies.angles - run.positions[-1]).max() < 5e-3
 
 
+@pytest.mark.parametrize("rate", [60, 240])
+def test_what_counts_as_resting_may_be_fast_and_gives_no_energy(rate: int):
+    """Slow balls may enter each other; they part no faster than they do by default."""
+    bodies = Hanging([-0.5, 0.0, 0.0, 0.0, 0.0], spacing=0.04, length=0.2)
+    chain = Chain([1] * 5, [0] * 5)
+    row = Row(bodies, chain, MODEL, 0.02, bodies.pivots, resting=0.1)
+    total = bodies.energy().sum()
+    steps(row, 20 * rate, 1 / rate)
+    assert row.impacts > 20
+    assert bodies.energy().sum() < 1.05 * total
+
+
 SHORT = 0.2
 FIVE, MIXED, LIGHT = [1.0] * 5, [0.5, 1.0, 2.0], [1.0, 0.2, 1.0]
 

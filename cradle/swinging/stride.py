@@ -68,8 +68,7 @@ class Alone:
         at = self._plane("motion: positions", x)
         self._refuse_a_pack(at.tolist())
         overlaps = self.reach - np.abs(np.diff(at))
-        if (overlaps > self.touching).any():
-            c = int(np.argmax(overlaps))
+        for c in np.flatnonzero(overlaps > self.touching)[:1].tolist():
             rule = f"must be at most `touching` = {self.touching:g} at the start"
             raise ValueError(f"balls {c} and {c + 1} overlap by {overlaps[c]:g} m; {rule}")
         self.pivots = None if pivots is None else self._plane("pivots", pivots)
@@ -213,7 +212,8 @@ class Alone:
         """Return velocities after those that touch and still approach have come to rest."""
         v, _ = common_velocities(masses, v, v[:-1] > v[1:], 0.0)
         if (deep := gaps < -self.touching).any():  # these part, slower than what is an impact
-            ramp = np.append(0.0, np.cumsum(0.5 * self.resting * deep))
+            slow = min(0.5 * self.resting, 0.16 * math.sqrt(self.acceleration * self.touching))
+            ramp = np.append(0.0, np.cumsum(slow * deep))
             v += ramp - masses @ ramp / masses.sum()
         return v
 
