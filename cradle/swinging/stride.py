@@ -211,7 +211,7 @@ class Alone:
     def _rested(self, masses: Vector, v: Vector, gaps: Vector) -> Vector:
         """Return velocities after those that touch and still approach have come to rest."""
         v, _ = common_velocities(masses, v, v[:-1] > v[1:], 0.0)
-        if (deep := gaps < -self.touching).any():  # these part, slower than what is an impact
+        if (deep := gaps < -self.touching).any():  # these part, no faster than by default
             slow = min(0.5 * self.resting, 0.16 * math.sqrt(self.acceleration * self.touching))
             ramp = np.append(0.0, np.cumsum(slow * deep))
             v += ramp - masses @ ramp / masses.sum()
