@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 DEFAULT = ROOT / "_build" / "html" / "cradle-companion.pdf"
 NAMES = (
     "chromium",
+    "chromium-headless-shell",
     "chromium-browser",
     "google-chrome",
     "google-chrome-stable",

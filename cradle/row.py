@@ -128,8 +128,7 @@ class Row(Alone):
 
         A ValueError or a RuntimeError is raised if the duration or what `motion` tells is wrong; if
         balls that touch are not in a row, have passed through each other or collide without end; if
-        a push shows that a mass is not the engine's; or if the world moves on between the steps of
-        this row: see `step_rows`.
+        a push shows that a mass is not the engine's; or if the world moves between (`step_rows`).
         """
         if type(duration) is float and 0.0 < duration <= self.quiet:  # the usual case, and fast
             self.quiet -= duration

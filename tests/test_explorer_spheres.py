@@ -69,6 +69,18 @@ def test_the_history_is_that_of_the_trace(spheres, e, gap):
     assert abs(np.diff(path, axis=0)).max() < 0.1
 
 
+def test_what_losses_have_opened_closes_again(spheres):
+    """Also where balls touch at the start: an impact begins with no "close", this one has some."""
+    masses, v = [0.307, 0.303, 0.394, 0.321], [1.0, 0, 0, 0]
+    answer, law = asked(spheres, masses, v, 0.9, record=True)
+    trace = collide(Chain(masses, v), SpringChain(**law, accuracy=1e-5))
+    closed = sorted(event.contact for event in trace.events if event.kind == "close")
+    told = [event["contact"] for event in answer["events"] if event["kind"] == "close"]
+    assert sorted(told) == closed
+    assert 0 in closed
+    assert answer["collisions"] == trace.collisions.tolist()
+
+
 def test_linear_springs(spheres, still):
     """The engine's, and those of the live cradle of chapter 2."""
     tab = still(chapter="compliance")

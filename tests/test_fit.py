@@ -114,8 +114,12 @@ def test_wrong_tables_are_refused_by_row_and_column(change, message):
     ],
 )
 def test_wrong_types_are_refused_by_name(call, message):
+    """A Series of pandas has names, too."""
+    shots = read_shots(columns("ABA", [1.0], outcome("ABA"), 0.01))
     with pytest.raises(TypeError, match=f"^{message}$"):
-        call(read_shots(columns("ABA", [1.0], outcome("ABA"), 0.01)))
+        call(shots)
+    named = {"AB": 0.5}
+    assert str(ratio(shots, pd.Series(named))["ABA"]) == str(ratio(shots, named)["ABA"])
 
 
 def test_sigma_is_given_once():

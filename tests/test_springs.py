@@ -587,13 +587,23 @@ def test_a_leaning_contact_that_losses_open_and_that_pushes_again_is_booked_then
     pushed, t = trace.step_forces[:, 1] > 0, trace.step_times
     first = t[np.flatnonzero(pushed & (t > trace.times[end]))[0]]
     assert first - np.diff(t).max() <= trace.times[close] <= first
+    for accuracy in (1e-3, 1e-5):  # not only up to a step
+        coarse = collide(
+            trace.chain, SpringChain(1.0, 1, viscosity=1.0, gaps=-0.1, accuracy=accuracy)
+        )
+        at, step = (
+            coarse.times[1 + coarse.events.index(("close", 1))],
+            np.diff(coarse.step_times).max(),
+        )
+        assert at == pytest.approx(trace.times[close], abs=0.02 * step)
     lasted = trace.times[-1] - (trace.times[close] - trace.times[end])
     assert trace.durations[1] == pytest.approx(lasted, rel=1e-6)
 
 
 def test_works_of_leaning_contacts_count_from_the_lean():
-    for masses, strikers in (([1, 1, 1], 1), ([2, 1, 1, 1], 2)):
-        chain = Chain(masses, [float(i < strikers) for i in range(len(masses))])
+    opens = [1, 1, 1], [1, 0, 0.7]  # at once, and is struck then
+    for masses, before in (([1, 1, 1], [1, 0, 0]), ([2, 1, 1, 1], [1, 1, 0, 0]), opens):
+        chain = Chain(masses, before)
         trace = collide(chain, SpringChain(1.0, gaps=-0.2))
         stored = 0.4 * trace.step_forces ** (5 / 3)  # at k = 1
         rises = np.clip(np.diff(stored, axis=0), 0, None).sum(axis=0)
@@ -605,6 +615,26 @@ def test_works_of_leaning_contacts_count_from_the_lean():
     at = math.log(quick / slow) / (quick - slow)
     deepest = lean + (math.exp(-slow * at) - math.exp(-quick * at)) / (quick - slow)
     assert trace.absorbed[0] == pytest.approx((deepest**2 - lean**2) / 2, rel=1e-8)
+
+
+@pytest.mark.parametrize("A", [0.5, 1.0, 1.2])
+def test_works_of_a_contact_that_swings_into_its_lean(A):
+    """A minimum that no maximum follows counts nothing: the last swings depend on the accuracy."""
+    lean, w = 0.2, math.sqrt(2 - A * A)
+    first = math.atan2(w, A) / w
+    peaks = (
+        math.exp(-A * first)
+        * math.sin(w * first)
+        / w
+        * (-math.exp(-A * math.pi / w)) ** np.arange(40)
+    )
+    assert peaks.min() > -lean  # it does not open
+    stored = (lean + peaks) ** 2 / 2
+    expected = stored[0] - lean**2 / 2 + (stored[2::2] - stored[1:-2:2]).sum()
+    for accuracy in (1e-3, 1e-5, 1e-6):
+        law = SpringChain(1.0, 1, viscosity=A, gaps=-lean, accuracy=accuracy)
+        found = collide(Chain([1, 1], [1, 0]), law).absorbed[0]
+        assert found == pytest.approx(expected, rel=1e-3), accuracy
 
 
 def test_balls_that_part_meet_after_a_flight():

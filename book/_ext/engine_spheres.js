@@ -69,7 +69,8 @@ function story({ masses, viscosity, exponent }, { mass, speed, length, h }, page
     for (let c = 0; c < loss.length; c += 1) {
       const turned = before[c] > before[c + 1] && now[c] <= now[c + 1];
       if (turned && (closed[c] || force[c] > 0)) events.push({ kind: "maximum_compression", contact: c, row });
-      touching[c] &&= d[c] >= -h * h; // the loop counts depths to h^2 / 12 of a rate
+      // The loop counts depths to h^2 / 12 of a rate; what losses have opened closes once more.
+      touching[c] &&= !closed[c] && d[c] >= -h * h;
       if (force[c] > 0 === closed[c]) continue;
       const kind = closed[c] ? "end" : "close";
       if (closed[c] || !touching[c]) events.push({ kind, contact: c, row });

@@ -157,7 +157,8 @@ def recommend(
     like = chain if len({*np.ravel(stiffness or 1.0)}) == 1 else None
     elastic = bool((chain.restitution == 1.0).all())
     wish = _Wish(chain, wishes, accuracy, model_error, impacts, ratios, stiffness, like, elastic)
-    found, failures = [], dict[str, list[str]]()
+    found = []
+    failures: dict[str, list[str]] = {}
     for group, make in _models(wish).items():
         try:
             found.append(_best(group, make, wish))

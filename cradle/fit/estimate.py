@@ -98,7 +98,8 @@ def _restitution_values(
     given: Fit | Known, sets: Sequence[ShotSet]
 ) -> dict[Key, tuple[float, float]]:
     """Return the coefficients and their errors by pair; all that the sets need are there."""
-    told = given.values() if isinstance(given, Fit) else must_be(Mapping, "restitution", given)
+    told: Any = given.values() if isinstance(given, Fit) else given
+    told = must_be(Mapping, "restitution", dict(told) if hasattr(told, "keys") else told)
     values = {}
     for pair, value in told.items():
         key, name = tuple(sorted(parameter_key(pair))), f"restitution[{pair!r}]"
@@ -165,13 +166,14 @@ def _fitted(
         return parameters.chi_squares(members, values, uncertain)
 
     found = {label(key): Estimate.of(kind, key, bound, None) for key, bound in bounds.items()}
-    groups, chi_square, freedom = list[Group](), 0.0, 0
+    groups, chi_square, freedom = [], 0.0, 0
     for keys in _together(fitted_keys(one.types) & acting for one in sets):
         members = [one for one in sets if fitted_keys(one.types) & {*keys}]
         search = refine if len(keys) > 1 else scan
         upper = np.array([bounds[key] for key in keys])
         scans, points, density, lowest = search(partial(chi, keys, members), upper)
-        groups += [Group(tuple(keys), points, density)] * (kind == "ratio")
+        if kind == "ratio":
+            groups.append(Group(tuple(keys), points, density))
         for key, one in zip(keys, scans, strict=True):
             found[label(key)] = Estimate.of(kind, key, bounds[key], one)
         chi_square += lowest

@@ -227,8 +227,7 @@ class Fit:
     def plot(self, name: str | None = None, axes: Any = None) -> Any:
         """Draw the likelihood of one estimate, its data and what is predicted, on two `axes`.
 
-        If `name` is left out it is the first identified one; if nothing was fitted, a ValueError is
-        raised.
+        If `name` is left out, the first identified one; a ValueError if nothing was fitted.
         """
         from cradle.pictures.fits import draw_fit
 

@@ -234,7 +234,8 @@ def _shot_set(name: str, shots: dict[str, list[_Row]]) -> ShotSet:
                 _refuse(row["where"], "type", f"{row['type']!r}; ball {row['ball']} of set "
                         f"{name} has {usual['type']!r} elsewhere")  # fmt: skip
         _check_physics(what, rows)
-    rest = name.removeprefix(types := "".join(row["type"] for row in first))
+    types = "".join(row["type"] for row in first)
+    rest = name.removeprefix(types)
     if rest != name and rest.isalpha() and rest.isupper():  # all other names are free
         _refuse(first[0]["where"], "set", f"set {name} has the balls {types} alone; is the row of "
                 f"ball {len(first) + 1} missing?  If not, give the set another name")  # fmt: skip

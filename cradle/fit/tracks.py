@@ -49,8 +49,7 @@ def read_tracker(path: str | Path, *, time_scale: float = 1.0, unit: float = 1.0
     time_scale : float
         True time over the time of the video: 30 / 240 if 240 frames a second are shown as 30.
     unit : float
-        Length of the file's unit in m, such as 0.01 or the size of a pixel, if the file does not
-        name it as in ``X (cm)``.
+        Length of the file's unit in m, such as 0.01, if it is not named there as in ``X (cm)``.
 
     Examples
     --------

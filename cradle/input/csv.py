@@ -50,8 +50,8 @@ def text_rows(name: str, content: bytes | str, comments: bool = False) -> dict[i
         if line.strip(",; \t") and not line.startswith("sep=")  # for a spreadsheet
         and (comments or not line.lstrip().startswith("#"))
     }  # fmt: skip
-    seen = "".join([*lines.values()][: None if comments else 1])  # a table's header; all of a film
-    mark = next((one for one in "\t;," if one in seen), " ")
+    seen = "".join(lines.values()) if comments else next(iter(lines.values()), "")
+    mark = next((one for one in "\t;," if one in seen), " ")  # a table has it in its header
     if mark != ",":
         comma = next((n for n, line in lines.items() if re.search(r",\d", line)), None)
         point = next((n for n, line in lines.items() if re.search(r"\d\.\d", line)), None)

@@ -30,8 +30,7 @@ VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP, REDUCED = 1, 2, 3, 4, 5, 6,
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
-# C, at least, without losses and with them, and for each radian of a ball, on average; the largest
-# step, in radians.
+# C, at least, without losses and with them, and a radian of a ball on average; radians of a step.
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
 # From so many kinks beyond two of each contact (more in a longer row) or radians runs are compared.
 OFTEN, LONG, SPREAD = 4.0, 30.0, 45.0

@@ -25,8 +25,7 @@ class SequentialCollisions:
     Parameters
     ----------
     order : {"left", "right"}
-        The end of a stretch of touching balls whose approaching contact collides first; the
-        outcome can depend on it.
+        The end of touching balls at which contacts collide first; outcomes can depend on it.
     max_events : int
         Number of steps after which the impact is given up.
 

@@ -183,9 +183,9 @@ class Path:
         from scipy.interpolate import CubicHermiteSpline as Cubic  # slow to import
 
         self.collisions = self.closed[0].astype(np.int64)
-        self.durations = np.zeros(len(self.k))
+        self.durations, self.absorbed = np.zeros((2, len(self.k)))
         u, grow = -np.diff(self.v), -np.diff(self.a)
-        self.absorbed = 0.0 - self.pushes(self.y[0]) * self.y[0] * (u[0] > 0.0) / (self.p + 1.0)
+        least = self.pushes(self.y[0]) * self.y[0] * (u[0] > 0.0) / (self.p + 1.0)
         closing = np.diff(self.closed.astype(int), axis=0)
         again, late, later = self.y[:-1] > 0.0, self.y + self.early * u, u + self.early * grow
         touching = np.minimum.accumulate(np.where(self.closed, -1.0, self.y), axis=0) >= -1e-12
@@ -211,7 +211,9 @@ class Path:
             push = np.where(self.closed[j] | self.closed[j + 1], self.pushes(y), 0.0)
             if kind == "maximum_compression":
                 shown = bool(u[j, c] > 0.0)  # between two maxima is a minimum
-                self.absorbed[c] += (1 if shown else -1) * push[c] * y[c] / (self.p + 1.0)
+                stored = push[c] * y[c] / (self.p + 1.0)
+                self.absorbed[c] += (stored - least[c]) * shown
+                least[c] = 0.0 if shown else stored  # where it begins to be compressed
             else:
                 shown, push[c] = kind == "end" or t > 0.0, 0.0
                 if self.p == 1.0 and not self.early.any():  # a kink that no cubic has

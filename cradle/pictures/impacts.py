@@ -89,8 +89,7 @@ def velocity_impulse(trace: Trace, contact: int, ax: Axes | None = None) -> Axes
     It shows the velocities of the contact's two balls against its impulse (sections 2.3, 2.4, 3.2).
     Where other contacts act while this one rests, its impulse does not grow, and a velocity jumps.
     Markers and letters show the contact's events, as the legend says; after several collisions the
-    letters carry numbers.  A contact that the chain does not have raises a ValueError.  Without
-    `ax` new axes are made.
+    letters carry numbers.  It draws on `ax` or on new axes; an unknown contact is a ValueError.
 
     Examples
     --------
