@@ -122,7 +122,7 @@ FRAMES = """() => new Promise((done) =>
 def launched():
     """Start the Chromium of this machine; skip where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    # The first one draws no window, and takes a third less of a processor.
+    # The first one draws no window, and takes a fifth less of a processor.
     names = "chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"
     command = next(filter(None, map(shutil.which, names)), None)
     if command is None:
