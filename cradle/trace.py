@@ -47,8 +47,7 @@ class Trace:
         of the velocities: an endless sequence may stop there, without `collapsed`.
     path, path_impulses : ndarray, shapes (K + 1, N) and (K + 1, N - 1)
         Velocities, m/s, and impulses so far, N s: a row before the impact and one at every event.
-        Rows are joined by straight lines, but not before a "collapse" or a "repetition", and not
-        for springs: see `curve`.
+        Straight lines join them, not before a "collapse" or "repetition", nor for springs: `curve`.
     events : tuple of Event, length K
         What happened at each row of the path but the first.
     collapsed : bool

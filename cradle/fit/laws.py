@@ -202,7 +202,9 @@ class _Search:
             ends.append(self.descend(np.array(z), every))
         low, high = (self.numbers(np.array(span)) for span in spans)
         intervals = {name: (low[name], high[name]) for name in self.ranges}
-        values, *others = ({k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in
-                            self.numbers(np.round(end, 9)).items()} for end in minima)  # fmt: skip
+        values, *others = (
+            {k: x if intervals[k] != tuple(self.ranges[k]) else None for k, x in found.items()}
+            for found in (self.numbers(np.round(end, 9)) for end in minima)
+        )
         left = {one.name: x[:, :-1] for one, x in zip(self.sets, self.left(minima[0]), strict=True)}
         return LawFit(values, intervals, tuple(others), left, lowest, self.freedom)

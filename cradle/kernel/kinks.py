@@ -2,8 +2,7 @@
 
 A contact pushes with f = k d^p while its compression d is above zero; with losses with f + dj/dt
 while that is above zero: j = A f, or by Hunt and Crossley A f d/(p + 1).  A sum over nodes differs
-from the integral of tau^p by h^(p + 1) zeta(-p, theta), theta the part of a step between the kink
-and its first node.
+from the integral of tau^p by h^(p + 1) zeta(-p, theta), theta steps from the kink to the first one.
 
 Kuwabara and Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; Hunt and Crossley, J. Appl. Mech. 42 (1975)
 440; Navot, J. Math. and Phys. 40 (1961) 271.
