@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cradle import Chain, ImpulseCorrelation, Pendulums, collide, swing
+from cradle import Chain, ImpulseCorrelation, Pendulums, SpringChain, collide, swing
+from cradle.row import Row
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 PROGRAMS = {
@@ -128,6 +129,26 @@ def test_ten_strokes(program, pulled):
     assert row.impacts < 20 * 10
     closed(bodies)
     closed(alone)
+
+
+@pytest.mark.parametrize("program", ["pymunk_cradle", "box2d_cradle"], indirect=True)
+@pytest.mark.parametrize(
+    "masses", [(1.0, 2.0, 0.5, 1.0, 3.0), (3.0, 1.0, 2.0, 0.5, 1.0), (0.2, 1.0, 0.3, 2.0, 1.0)]
+)
+def test_the_first_stroke_of_different_masses(program, masses):
+    """The page "Newton's cradle in your engine" says so."""
+    bodies, law = program.hang(), SpringChain(1e10)
+    for ball, mass in zip(bodies.balls, masses, strict=True):
+        ball.mass = mass
+    pivots = [(2 * program.RADIUS * i, 0) for i in range(5)]
+    row = Row(bodies, Chain(masses, [0] * 5), law, program.RADIUS, pivots)
+    for _ in range(1000):  # to the turning point
+        row.step(STEP)
+    hanging = Pendulums(length=program.LENGTH, gravity=GRAVITY, angle="full")
+    angles = [-program.ANGLE, 0, 0, 0, 0]
+    run = swing(Chain(masses, [0] * 5), law, angles, [1.0], pendulums=hanging)
+    x = np.array(bodies.motion()[0], float)[:, 0] - 2 * program.RADIUS * np.arange(5)
+    np.testing.assert_allclose(np.arcsin(x / program.LENGTH), run.positions[0], atol=1e-3)
 
 
 def test_an_engine_alone_moves_its_balls_otherwise(program):

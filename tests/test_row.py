@@ -118,6 +118,18 @@ def test_a_row_swings_as_swing_does(pulled: int):
     assert row.impacts < 200
 
 
+@pytest.mark.parametrize("first", [0.5, 1.0], ids=["velocity Verlet", "semi-implicit Euler"])
+@pytest.mark.parametrize("masses", [(1, 2, 0.5, 1, 3), (3, 1, 2, 0.5, 1), (0.2, 1, 0.3, 2, 1)])
+def test_the_first_stroke_of_spheres_of_different_masses(masses, first):
+    """As `swing` has it; later ones differ, as there an impact lasts, and a row takes no time."""
+    angles, model = [-0.5, 0.0, 0.0, 0.0, 0.0], SpringChain(1e10)
+    bodies = Hanging(angles, masses, first=first, kicks=1)
+    steps(hung(bodies, model=model), 1000, 1e-3)  # to the turning point
+    hanging = Pendulums(length=LENGTH, gravity=GRAVITY, angle="full")
+    run = swing(Chain(masses, [0] * 5), model, angles, [1.0], pendulums=hanging)
+    np.testing.assert_allclose(bodies.angles, run.positions[0], atol=1e-3)
+
+
 def test_balls_that_fly_to_and_fro_between_others_are_struck_one_by_one():
     """A light ball is near both neighbours, but touches one at a time."""
     masses, angles = [1.0, 1.0, 0.1, 1.0, 1.0], [-0.5, 0.0, 0.0, 0.0, 0.0]
