@@ -129,6 +129,9 @@ def test_engines_table_of_words():
             most = max(told, key=told.count)
             others = [f"{k}: {v}" for k, v in answers.items() if v != most]
             expected = "; ".join([most, *others])
+            if placement == "pressed" and others and expected == before:
+                expected = "as touching"
+            before = expected
             assert rest.strip().startswith(expected), (name, placement, rest)
             rest = rest.strip()[len(expected) :]
         assert not rest.strip()
