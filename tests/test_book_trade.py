@@ -116,7 +116,7 @@ def test_engines_table_of_words():
     printed = " ".join(ENGINES_PAGE.printed("engines-letters").split())
     lines = re.split("|".join(ENGINES), printed)[1:]
     for name, line in zip(ENGINES, lines, strict=True):
-        rest = line
+        rest, before = line, None
         for placement in ("apart", "touching", "pressed"):
             answers = {}
             for scene in (*ELASTIC, "ABCCA"):
