@@ -190,6 +190,23 @@ def test_nothing_moves_on_a_desk_when_the_first_hit_opens_the_rest(still, width)
     assert (tab.evaluate(top), tab.evaluate("scrollY")) == (before, 0)
 
 
+def test_what_to_do_first_gives_way_on_a_phone(still):
+    """What to do next takes its room: the button stays under the finger."""
+    tab = still("", width=390)
+    tab.drawn()
+    told = tab.locator(".what-to-do > span:visible")
+    room = "document.querySelector('.what-to-do').getBoundingClientRect().height"
+    top = "document.querySelector('.run .main').getBoundingClientRect().top"
+    before = tab.evaluate(room), tab.evaluate(top)
+    (words,) = told.all_inner_texts()
+    assert words.startswith("First guess")
+    tab.act("step()")
+    tab.drawn()
+    (words,) = told.all_inner_texts()
+    assert words.startswith("Choose another scene")
+    assert (tab.evaluate(room), tab.evaluate(top)) == pytest.approx(before, abs=1)
+
+
 def test_pictures_wait_after_a_hit_that_was_guessed(still):
     """So that the guess can be compared; the balls rest a little, then they swing on."""
     tab = still(chapter="intro", stopped=True)
