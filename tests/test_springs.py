@@ -434,6 +434,21 @@ def test_a_step_has_half_the_digits_of_a_double(monkeypatch):
     assert [(math.frexp(h)[0] * 2**27) % 1 for h in steps] == [0, 0, 0, 0]
 
 
+def test_most_short_rows_need_one_run(monkeypatch):
+    """The first step is for balls that differ: with that for equal ones half of them need two."""
+    runs, aim, begin = [], control.aim, control.begin
+    monkeypatch.setattr(control, "aim", lambda *given: runs.append(0) or aim(*given))
+
+    def begun(*given):
+        runs[-1] += 1
+        begin(*given)
+
+    monkeypatch.setattr(control, "begin", begun)
+    m = 0.5 + 1.5 * np.random.default_rng(3).random((60, 5))
+    spring_velocities(m, struck(5), accuracy=1e-3)
+    assert runs.count(1) > 0.85 * len(m)
+
+
 @needs_numba
 def test_a_run_that_is_compared_has_a_step_much_finer_than_the_one_before(monkeypatch):
     """Else the two agree by nearness; long rows, in which balls collide often, show it."""

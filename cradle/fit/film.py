@@ -56,8 +56,7 @@ def velocities_from_tracks(
         How much time before and after the impact is used, s.  If left out, the longest one that the
         marks agree with: at most a quarter of a swing, or a quarter of a second on a track.
     striker : int or sequence of int, optional
-        Index of the ball that moves before, or of those lifted together, as (0, 1); if left out,
-        the one whose marks move most.
+        Index of the ball that moves first, or of several, as (0, 1); else the one that moves most.
 
     Examples
     --------

@@ -77,9 +77,8 @@ def fit_swing(
     hold 95 %, by profiles of chi-square (Venzon and Moolgavkar, Applied Statistics 37, 1988,
     87-94).  If the law fails (a large chi-square, or residuals alike from frame to frame), they are
     widened by how much parts of the film differ (clusters: Liang and Zeger, Biometrika 73, 1986,
-    13-22).  The interval of the damping is too short if nearly all balls were pulled; one of no
-    width says that the law jumps there.  A wrong value, no ball seen on its way, and too few
-    readings raise a ValueError.
+    13-22).  The interval of the damping is too short if nearly all balls were pulled; where one has
+    no width the law jumps.  Wrong values, no ball in motion, too few readings: a ValueError.
 
     Parameters
     ----------

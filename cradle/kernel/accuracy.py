@@ -30,8 +30,9 @@ VALUE, QUICK, LIGHT, SOFT, LATE, WIDE, NARROW, DEEP, REDUCED = 1, 2, 3, 4, 5, 6,
 # A step times the largest frequency from which on a run shows whether it was short enough; a
 # coarser one that only measures the frequency; and what it may measure too little.
 ENOUGH, COARSE, SPARE = 0.2, 0.5, 1.05
-# C, at least, without losses and with them, and a radian of a ball on average; radians of a step.
+# C, at least, without losses and with them, and a radian of a ball on average; radians of a step;
 HARD, LOST, SWING, WHOLE = 0.01, 0.022, 0.0027, 0.8
+TURN, FEW = 2.4, 7  # and of equal balls; longest row whose first step is for unequal ones
 # From so many kinks beyond two of each contact (more in a longer row) or radians runs are compared.
 OFTEN, LONG, SPREAD = 4.0, 30.0, 45.0
 STRONG = 0.5  # A from which on they are, of viscoelastic balls: it may open a contact at any node
@@ -114,20 +115,20 @@ def measure(n, chain, law, sized, s, clock):
 
 @apart
 def highest(n, p, s):
-    """Return a bound of the square of a ball's frequency: two contacts store no more than all E.
+    """Return a bound of the square of a ball's frequency, as two contacts store no more than all E.
 
     By Hoelder, k d^(p - 1) + k' d'^(p - 1) <= (k + k')^(2/(p + 1)) ((p + 1) E)^((p - 1)/(p + 1)).
     """
-    energy = part = left = 0.0
+    energy = part = total = left = 0.0
     for i in range(n):
         a = s[i]
         energy += 0.5 * (p + 1.0) * a.start * a.start / a.w
         both = (left + a.k) * a.w
-        part = max(part, both * both * grade(p, a.w))
-        left = a.k
+        own = both * both * grade(p, a.w)
+        part, total, left = max(part, own), total + own, a.k
     # Where powers would overflow, and where strings press, the runs tell.
     bound = p * (part * grade(p, min(energy, 1e15))) ** (1.0 / (p + 1.0))
-    return bound if bound > 0.0 else 1.0
+    return bound if bound > 0.0 else 1.0, n * part / total  # and how the balls differ
 
 
 @apart
@@ -135,11 +136,14 @@ def aim(n, law, s, clock):
     """Choose the first step, and the largest part of a radian that a step may be."""
     accuracy, spread = law.accuracy, max(0.0, 1.5 - law.p)
     clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
+    clock.swing = (0.75 if clock.lossy else 1.0) * SWING / clock.hard
     part = accuracy / clock.hard
     root = math.sqrt(math.sqrt(part))
     clock.eta = min(root, (1.5 * part) ** (1.0 / 3.5)) if part < 0.04 else root
-    eta = min(clock.eta, 0.7 if clock.lossy else WHOLE)
-    top = highest(n, law.p, s)
+    top, unlike = highest(n, law.p, s)
+    # Longer where balls differ: in short rows, not compared anyway, it spares most second runs.
+    long = 1.0 if clock.leans or n > FEW else max(1.0, clock.swing * TURN * unlike)
+    eta = min(clock.eta / math.sqrt(math.sqrt(long)), 0.7 if clock.lossy else WHOLE)
     h = (eta if eta >= ENOUGH else COARSE) / math.sqrt(top)
     # Half its digits, rounded down: the last ones of a power may depend on the machine.
     h = min(h, DAMPED / max(clock.lossy, 1e-300) / top) * (1.0 - 1e-8)
@@ -165,8 +169,7 @@ def judge(n, law, change, s, clock):
         used += min(s[c].kinks, 1)
     phase = clock.h * math.sqrt(clock.top)
     radians = clock.steps * phase / max(used, 1)
-    swung = max(1.0, (0.75 if clock.lossy else 1.0) * SWING * radians / clock.hard)
-    off = phase / clock.eta * math.sqrt(math.sqrt(swung))
+    off = phase / clock.eta * math.sqrt(math.sqrt(max(1.0, clock.swing * radians)))
     often = many > clock.often * max(1.0, used / SPREAD)
     compare = often or clock.leans > 0 or (clock.lossy > STRONG and not law.hunt)
     told, ratio = math.inf, clock.coarser / clock.h

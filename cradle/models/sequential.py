@@ -19,8 +19,7 @@ class SequentialCollisions:
     ``ImpulseCorrelation(0)`` solves it (Johnson, Int. J. Mech. Eng. Educ. 4 (1976); Han and
     Gilmore, J. Mech. Design 115 (1993) 412-422).  Afterwards either of these contacts may collide;
     one between two collisions waits until both have ended.  Collisions that share no ball have no
-    common clock: which of them ends first is decided by rule R8 of the book.  A value outside its
-    range raises a `ValueError`.
+    common clock: rule R8 of the book decides which ends first.  Wrong values raise a `ValueError`.
 
     Parameters
     ----------

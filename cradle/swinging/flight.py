@@ -93,8 +93,7 @@ def _search(level: float, waves: list[Wave], parting: bool, horizon: float) -> f
 @functools.lru_cache(64)
 def _bodies(hanging: Hanging, together: Marks) -> tuple[list[int], Vector, Vector, list[Fall]]:
     """Return the first ball of each ball's body, where it hangs, its rate; what falls to zero."""
-    # A ball is at centre + Re(amplitude exp(rate t)); frequencies, dampings and lowest points of
-    # bodies are means over the mass.
+    # A ball is at centre + Re(amplitude exp(rate t)); of a body both are means over the mass.
     n, square = len(hanging.masses), hanging.gravity / hanging.length
     centre, rates = np.zeros(n), np.zeros(n, dtype=complex)
     first, forces = list[int](), {}
