@@ -279,6 +279,9 @@ def test_the_table_of_advice():
     assert told["off-pairs"] == f"{100 * np.abs(half - np.eye(5)[4]).max():.1f}"
     half = integrated([1] * 5, [1, 1, 0, 0, 0], gaps=0.5 * DEPTH)
     assert told["off-pairs-two"] == f"{100 * np.abs(half - [0, 0, 0, 1, 1]).max():.1f}"
+    # Three of ten strike; any other number is nearer to pairs.
+    half = integrated([1] * 10, [1] * 3 + [0] * 7, gaps=0.5 * DEPTH)
+    assert told["off-pairs-ten"] == f"{100 * np.abs(half - [*[0] * 7, *[1] * 3]).max():.1f}"
     (row,) = read("forces.csv", chain=SIX, method=METHODS[3])
     CHAPTER.tells({"random-rule": 100 * float(row["error"])})
     k = hertz_stiffness([0.011] * 2)
