@@ -272,6 +272,17 @@ def test_a_formula_keeps_its_punctuation(chapters):
         assert not loose, path
 
 
+def test_a_number_keeps_its_unit(chapters):
+    """In the text, not in what code prints and in tables of pandas."""
+    kept = 0
+    for path, text in chapters.items():
+        shown = re.sub(r'(?s)<table[^>]*class="dataframe.*?</table>', "", text)
+        shown = re.sub(r"(?s)<(pre|code|svg|script|style|title)\b.*?</\1>|<[^>]+>", "", shown)
+        assert not re.findall(r".{20}\d (?:%|µm|mm|m/s)(?!\w).{9}", shown), path
+        kept += len(re.findall("\\d\N{NO-BREAK SPACE}(?:%|µm|mm|m/s)", shown))
+    assert kept > 300
+
+
 def test_no_table_has_a_second_head_for_its_row_labels_alone(chapters):
     heads = re.findall(r"(?s)<thead>.*?</thead>", "".join(chapters.values()))
     assert len(heads) > 50

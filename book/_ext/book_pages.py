@@ -47,6 +47,11 @@ ADDRESSED = (
 #: What may stand before a formula, and behind it, without a space.
 OPENING, CLOSING = re.compile(r"[(\[]+$"), re.compile(r"^[)\].,;:!?]+")
 
+#: The space before a unit; its number may stand in a node of its own.
+UNIT = re.compile(
+    r"(?:^|(?<=\d)) (?=(?:%|[cmµ]?m(?:/s)?|[mµn]?s|kg|g)(?![\w/]))"
+)
+
 #: The button that gives a page's notebook.
 NOTEBOOK = re.compile(
     r'(<a href="[^"]*_sources/[^"]*\.ipynb") target="_blank"'
@@ -215,6 +220,19 @@ def keep_punctuation(
             parent[at - 1] = nodes.Text(before[: -len(opening)])
         if closing:
             parent[at + 1] = nodes.Text(after[len(closing) :])
+
+
+def keep_units(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Let no line break between a number and its unit."""
+    for text in list(doctree.findall(nodes.Text)):
+        if isinstance(
+            text.parent,
+            (nodes.literal, nodes.literal_block, nodes.raw, nodes.math),
+        ):
+            continue
+        kept = UNIT.sub("\N{NO-BREAK SPACE}", text)
+        if kept != text:
+            text.parent.replace(text, nodes.Text(kept))
 
 
 def _end_of(node: nodes.Node | None, pattern: re.Pattern[str]) -> str:
@@ -431,6 +449,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("builder-inited", set_all_for_print)
     app.connect("doctree-resolved", keep_tags)
     app.connect("doctree-resolved", keep_punctuation)
+    app.connect("doctree-resolved", keep_units)
     app.connect("doctree-resolved", mend_tables_of_pandas)
     app.connect("doctree-resolved", break_code_in_tables)
     app.connect("doctree-resolved", lead_back)
