@@ -86,19 +86,21 @@ def exact(problem, read=meaning, *, events=EVENTS, twice=False, impact=Exact):
 def on_bounds(problem):
     """The chain with its ratios within 4 roundings of their bounds (Eq. 53, mirrored) on them.
 
-    Of the bounds as they are, or in floats, as they are drawn: at light balls these lose digits.
-    A bound that comes into force later, when a neighbour has ended, is not looked for.
+    Of the bounds as they are, or as they are drawn: in floats, from the ratio given beyond, which
+    leaves few digits of what it lacks to 1.  A bound that comes into force later, when a
+    neighbour has ended, is not looked for.
     """
 
     def one_way(masses, ratios):
-        found, onward = [], Decimal(0)
+        found, onward, seen = [], Decimal(0), 0.0
         m = [meaning(x) for x in masses]
         for here, beyond, ratio in reversed(list(zip(m[1:], m[2:], map(meaning, ratios)))):
             bound = beyond / (beyond + here * (1 - onward))
-            drawn = 1 / (1 + float(here) / float(beyond) * (1 - float(onward)))
+            drawn = 1 / (1 + float(here) / float(beyond) * (1 - seen))
             off = min(abs(ratio / bound - 1), abs(float(ratio) / drawn - 1))
             found.insert(0, bound if off < 4 * Decimal(2) ** -52 else ratio)
             onward = min(found[0], bound)  # what lies above is held at it
+            seen = float(ratio if found[0] <= bound else bound)
         return found
 
     with decimal.localcontext(prec=4 * DIGITS):

@@ -156,6 +156,13 @@ def test_a_bound_is_meant_as_floats_draw_it():
     assert judge(problem, lambda _: as_it_is).word == "other reading"
 
 
+def test_a_bound_is_drawn_from_the_ratio_given_beyond():
+    """All balls but the first then part as one body: 1 kg strikes 11.5 kg."""
+    problem = CHAINS["ratios between four roundings and five from their bound"].problem
+    assert judge(problem, answering(2e-9)).word == "wrong"
+    assert batch(problem) == pytest.approx([-0.84, *[0.16] * 5], rel=1e-14)
+
+
 def test_a_bound_counts_on_what_is_in_force_beyond():
     """Ball 3's ratio is above its bound, 1/2, and held there; with it ball 2's bound is 2/3."""
     problem = CHAINS["a bound that follows from a ratio above its own"].problem

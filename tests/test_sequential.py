@@ -5,7 +5,8 @@ import pytest
 from chains import magnitudes, uniform
 from laws import keeps
 
-from cradle import Chain, collide
+from cradle import Chain, collide, outcomes
+from cradle.closed_form import largest_ratios
 from cradle.models.sequential import FusedChain, SequentialCollisions
 
 ARRAYS = ("velocities", "impulses", "absorbed", "collisions", "path", "path_impulses")
@@ -87,6 +88,23 @@ def test_fused_bodies_collide_like_two_balls(n):
         keeps(trace)
         assert trace.events[:2] == (("maximum_compression", struck), ("end", struck))
         assert trace.path[1].tolist() == pytest.approx(np.full(n, m @ v / m.sum()).tolist())
+
+
+@pytest.mark.parametrize("struck", [0, 3, 6])
+@pytest.mark.parametrize("decades", [1, 3, 6])
+def test_largest_ratios_fuse_rows(decades, struck):
+    """A bound near 1 keeps few digits of what it lacks to 1, and so does the next one from it."""
+    n, count = 8, 50
+    masses = magnitudes(np.random.default_rng(decades), decades, (count, n))
+    forward, backward = np.zeros((2, count, n - 2))
+    for k in range(n - 2):  # one bound after the other, from the far ends
+        forward[:, -1 - k] = largest_ratios(masses, forward, backward)[0][:, -1 - k]
+        backward[:, k] = largest_ratios(masses, forward, backward)[1][:, k]
+    v = np.where(np.arange(n) <= struck, 1.0, 0.0)
+    found = outcomes(masses, v, 0.5, forward, backward)
+    assert found.margin.min() > 1e-9
+    fused = [collide(Chain(m, v, 0.5), FusedChain()).velocities for m in masses]
+    np.testing.assert_allclose(found.velocities, fused, rtol=0, atol=1e-14)
 
 
 def test_fused_masses_whose_sum_overflows():

@@ -68,9 +68,9 @@ def largest_ratio(m, driven, onward):
     return 1.0 / (1.0 + m / driven * (1.0 - onward))
 
 
-def meant(ratio, m, driven, onward):
-    """R7: the ratio, or its bound (Eq. 53) if nothing but rounding keeps it from that."""
-    bound = largest_ratio(m.real, driven.real, onward.real)
+def meant(ratio, m, driven, onward, given):
+    """R7: the ratio, or its bound (Eq. 53) if only rounding parts it from that of the one given."""
+    bound = largest_ratio(m.real, driven.real, given)
     if bound < ratio.real * LIMITS.rounded and ratio.real < bound * LIMITS.rounded:
         return over(driven, plus(driven, times(m, minus(ONE, onward))))
     return ratio
@@ -124,9 +124,7 @@ def prepare(n, chain, meeting, state):
         b.v = chain.v[i]
         b.start = scaled(read(chain.v[i]), tally.unit)
         b.m = scaled(read(chain.m[i]), mass_unit)
-        b.inverse = over(ONE, b.m)
-        b.pull = ZERO
-        b.turn = 0
+        b.inverse, b.pull, b.turn = over(ONE, b.m), ZERO, 0
         tally.cut_off = min(tally.cut_off, LIMITS.cut * b.m.real)
     for c in range(n - 1):
         k = contact[c]
@@ -135,7 +133,8 @@ def prepare(n, chain, meeting, state):
         if c < n - 2:
             back = contact[c - 1].backward if c > 0 else ZERO
             k.forward = read(chain.forward[c])
-            k.backward = meant(read(chain.backward[c]), ball[c + 1].m, ball[c].m, back)
+            given = chain.backward[c - 1] if c > 0 else 0.0
+            k.backward = meant(read(chain.backward[c]), ball[c + 1].m, ball[c].m, back, given)
             for ratio in (chain.forward[c], chain.backward[c]):
                 product *= ratio if 0.0 < ratio < LIMITS.faint else 1.0
         k.u = minus(ball[c].start, ball[c + 1].start)
@@ -149,7 +148,8 @@ def prepare(n, chain, meeting, state):
             tally.energy = max(tally.energy, reduced_mass(c, ball) * k.u.real * k.u.real)
     for c in range(n - 3, -1, -1):
         onward = contact[c + 1].forward if c < n - 3 else ZERO
-        contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward)
+        given = chain.forward[c + 1] if c < n - 3 else 0.0
+        contact[c].forward = meant(contact[c].forward, ball[c + 1].m, ball[c + 2].m, onward, given)
     forget(LOWER, state.level)
     forget(UPPER, state.level)
     start(n, state)

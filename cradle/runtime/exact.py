@@ -29,13 +29,13 @@ def meant(x: float) -> Decimal:
 
 
 def ratios(m: list[Decimal], given: list[Decimal]) -> list[Decimal]:
-    """R7: forward ratios; one that nothing but rounding keeps from its bound (Eq. 53) is on it."""
-    found, onward = list[Decimal](), Decimal(0)
+    """R7: forward ratios, on the bound (Eq. 53) if rounding alone parts them; one above is held."""
+    found, onward, seen = list[Decimal](), Decimal(0), 0.0
     for here, driven, ratio in zip(m[-2:0:-1], m[:1:-1], given[::-1], strict=True):
         bound = driven / (driven + here * (1 - onward))
-        drawn = 1.0 / (1.0 + float(here) / float(driven) * (1.0 - float(onward)))
+        drawn = 1.0 / (1.0 + float(here) / float(driven) * (1.0 - seen))
         found.append(bound if abs(float(ratio) / drawn - 1.0) < LIMITS.rounded - 1.0 else ratio)
-        onward = min(found[-1], bound)  # above its bound it is held there
+        onward, seen = (bound, float(bound)) if found[-1] > bound else (found[-1], float(ratio))
     return found[::-1]
 
 
