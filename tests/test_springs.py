@@ -436,6 +436,7 @@ def test_a_step_has_half_the_digits_of_a_double(monkeypatch):
 
 def test_most_short_rows_need_one_run(monkeypatch):
     """The first step is for balls that differ: with that for equal ones half of them need two."""
+    monkeypatch.setenv(runtime.VARIABLE, "plain")
     runs, aim, begin = [], control.aim, control.begin
     monkeypatch.setattr(control, "aim", lambda *given: runs.append(0) or aim(*given))
 
@@ -447,6 +448,22 @@ def test_most_short_rows_need_one_run(monkeypatch):
     m = 0.5 + 1.5 * np.random.default_rng(3).random((60, 5))
     spring_velocities(m, struck(5), accuracy=1e-3)
     assert runs.count(1) > 0.85 * len(m)
+
+
+@needs_numba
+@pytest.mark.parametrize("n", [12, 20])
+def test_long_rows_that_close_together_keep_their_accuracy(n, monkeypatch):
+    """The error grows with how much all balls close, not with the fastest closing of a contact."""
+    monkeypatch.setenv(runtime.VARIABLE, "compiled")
+    rng = np.random.default_rng(5)
+    v, m = np.sort(rng.random((200, n)), axis=1)[:, ::-1], magnitudes(rng, 1, (200, n))
+    speed = (v[:, :-1] - v[:, 1:]).max(axis=1, keepdims=True)
+    exact = spring_velocities(m, v, accuracy=1e-8)
+    for accuracy in (1e-3, 1e-4):
+        found, told = spring_outcomes(m, v, accuracy=accuracy)
+        off = (abs(found - exact) / speed).max(axis=1)
+        assert off.max() < 0.7 * accuracy
+        assert (off < told).all()
 
 
 @needs_numba

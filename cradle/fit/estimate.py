@@ -47,10 +47,9 @@ def ratio(
     """Fit the Impulse Correlation Ratio of every triplet in shots of three balls and more.
 
     There is one estimate for each triplet and direction that is not known, between 0 and the bound
-    of three balls (Eq. 34).  Ratios that act in the same shots are fitted together; Ceanga and
-    Hurmuzlu fit one at a time (section 4.2).  A ValueError is raised if no set has three balls and
-    nothing is known, a coefficient of restitution is missing, a known ratio is above its bound, or
-    more than six ratios act together.
+    of three balls (Eq. 34).  Ratios that act in the same shots, six at most, are fitted together;
+    Ceanga and Hurmuzlu fit one at a time (section 4.2).  A ValueError says that no set has three
+    balls and nothing is known, a restitution is missing, or a known ratio is above its bound.
 
     Parameters
     ----------

@@ -36,12 +36,10 @@ TURN, FEW = 2.4, 7  # and of equal balls; longest row whose first step is for un
 # From so many kinks beyond two of each contact (more in a longer row) or radians runs are compared.
 OFTEN, LONG, SPREAD = 4.0, 30.0, 45.0
 STRONG = 0.5  # A from which on they are, of viscoelastic balls: it may open a contact at any node
-TRIALS = 16  # runs of a chain, each finer than the one before
-DAMPED = 0.25  # step times A times the square of a frequency, at most
+TRIALS, DAMPED = 16, 0.25  # runs, at most; step times A times the square of a frequency, at most
 SMALLEST = 1e-9  # lightest ball and softest contact, as a part of the largest
 LONGEST, MOST_HUNT = 10.0, 10.0  # A, in contact times, and in one over the closing speed
-TINY = 1e-300  # the least depth, and one over the largest
-NORMAL = 2.0**-1022  # a smaller number has lost digits
+TINY, NORMAL = 1e-300, 2.0**-1022  # the least depth, 1 over the largest; less has lost digits
 # The widest gap and the narrowest, in depths; the widest whose last digit is below this accuracy.
 WIDEST, NARROWEST, BLURRED = 1e9, 1e-12, 1e13
 
@@ -115,32 +113,35 @@ def measure(n, chain, law, sized, s, clock):
 
 @apart
 def highest(n, p, s):
-    """Return a bound of the square of a ball's frequency, as two contacts store no more than all E.
+    """Bound the square of a ball's frequency: two contacts store at most all E; size up the row.
 
     By Hoelder, k d^(p - 1) + k' d'^(p - 1) <= (k + k')^(2/(p + 1)) ((p + 1) E)^((p - 1)/(p + 1)).
     """
-    energy = part = total = left = 0.0
+    energy = part = total = left = drop = 0.0
+    fastest = s[0].start
     for i in range(n):
         a = s[i]
+        fastest = max(fastest, a.start)
+        drop = max(drop, fastest - a.start)
         energy += 0.5 * (p + 1.0) * a.start * a.start / a.w
         both = (left + a.k) * a.w
         own = both * both * grade(p, a.w)
         part, total, left = max(part, own), total + own, a.k
     # Where powers would overflow, and where strings press, the runs tell.
     bound = p * (part * grade(p, min(energy, 1e15))) ** (1.0 / (p + 1.0))
-    return bound if bound > 0.0 else 1.0, n * part / total  # and how the balls differ
+    return bound if bound > 0.0 else 1.0, n * part / total, drop  # how balls differ, and all close
 
 
 @apart
 def aim(n, law, s, clock):
     """Choose the first step, and the largest part of a radian that a step may be."""
     accuracy, spread = law.accuracy, max(0.0, 1.5 - law.p)
-    clock.hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
-    clock.swing = (0.75 if clock.lossy else 1.0) * SWING / clock.hard
-    part = accuracy / clock.hard
+    hard, clock.often = (LOST if clock.lossy else HARD) + spread, OFTEN - 8.0 * spread
+    clock.swing = (0.75 if clock.lossy else 1.0) * SWING / hard
+    top, unlike, drop = highest(n, law.p, s)
+    part = accuracy / hard / max(drop, 1.0)
     root = math.sqrt(math.sqrt(part))
     clock.eta = min(root, (1.5 * part) ** (1.0 / 3.5)) if part < 0.04 else root
-    top, unlike = highest(n, law.p, s)
     # Longer where balls differ: in short rows, not compared anyway, it spares most second runs.
     long = 1.0 if clock.leans or n > FEW else max(1.0, clock.swing * TURN * unlike)
     eta = min(clock.eta / math.sqrt(math.sqrt(long)), 0.7 if clock.lossy else WHOLE)

@@ -93,8 +93,7 @@ class Clock:
     eta: float  # what it times a frequency may be, at most,
     most: float  # steps of a run
     trial: int  # number of the run,
-    hard: float  # error over the fourth power of a step, at least,
-    swing: float  # and what of it is for each radian of a ball
+    swing: float  # how much of the error is for each radian of a ball
     often: float  # how many kinks of a contact are many
     coarser: float  # step of the run before it, if that was fine enough,
     told: float  # what its change from another told of the error, over the accuracy,
