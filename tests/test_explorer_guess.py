@@ -264,7 +264,11 @@ def test_a_question_of_a_chapter(still, name, setting, said, words, answered):
     asked.get_by_role("button", name="Next hit", exact=True).click()
     tab.drawn()
     assert not tab.state("covered")
-    assert tab.inner_text(".question .told") == (words if answered else f"Answer: {told}.")
+    told = words if answered else f"Answer: {told}."
+    assert tab.inner_text(".question .told") == told
+    asked.get_by_role("button", name="Next hit", exact=True).click()  # the first one was asked for
+    tab.drawn()
+    assert tab.inner_text(".question .told") == told
 
 
 def test_events_are_listed(still):
@@ -391,6 +395,15 @@ def test_tasks_are_judged_by_the_solver(still):
     tab.act("read('speeds=1,1,0&forward=0.5')")
     tab.drawn()
     assert not any(tab.evaluate(f"{nothing}({EXPLORER}.state)"))
+    # A ratio above its bound is that of the bound; to be faster by a tenth is to be faster.
+    for setting, tasks in (
+        ("masses=10,9.5,0.5&forward=0.15", [1]),
+        ("masses=1.2,1,0.8&forward=0.15", [2]),
+    ):
+        tab.act(f"read('speeds=1,0,0&{setting}')")
+        tab.drawn()
+        met = tab.evaluate(f"{nothing}({EXPLORER}.state)")
+        assert [k for k, yes in enumerate(met, 1) if yes] == tasks, setting
     # Nor do three balls that stick together: they collide again and again, and leave alike.
     tab.act("read('speeds=1,0,0&restitution=0')")
     tab.drawn()
@@ -469,3 +482,11 @@ def test_a_hit_is_heard(still):
     tab.push("Sound", 4000)
     assert tab.evaluate("clicks")
     assert set(tab.evaluate("clicks")) == {0.25}  # half of the loudest, as the speed is
+    tab.push("Pull back")
+    tab.push("Slow motion", 50)
+    tab.evaluate("clicks.length = 0")
+    tab.push("Let go", 7000)  # the first hit begins and ends
+    assert tab.evaluate("clicks") == [0.25]
+    tab.evaluate("AudioContext.prototype.close = () => clicks.push('closed'), null")
+    tab.push("Sound")
+    assert tab.evaluate("clicks") == [0.25, "closed"]

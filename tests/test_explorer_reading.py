@@ -63,6 +63,8 @@ WRONG_ADDRESSES = {
     "letters=ABXBA": "letters = ABXBA",
     "alpha=0.1": "alpha is no part of a setting",
     "toString=1": "toString is no part of a setting",
+    "law=toString": "law = toString; must be rule or spheres or springs",
+    "speeds=1, ,0": "speeds[1] = NaN",
     "speeds=1,%": "speeds[1] = NaN",
     "scene=none": "scene is no part of a setting",
     "speeds=1e-300,0": "speeds[0] = 1e-300; must be 0 or at least 0.000001 in size",
@@ -669,6 +671,9 @@ def test_map_is_the_solvers(still):
     tab.keyboard.press("ArrowRight")
     assert tab.drawn()["masses"][2] < moved["masses"][2]
     assert tab.evaluate("document.activeElement.classList.contains('point')")
+    tab.go_to("speeds=1,0,0&masses=0.25,1,2&restitution=0.5&forward=0&picture=map")
+    assert abs(tab.drawn()["after"][1]) < 1e-15  # of ball 2 rounding alone is left
+    assert tab.locator(".point").get_attribute("aria-valuetext").endswith("going back: ball 1")
 
 
 def test_sweep_is_the_solvers(linked):
@@ -776,6 +781,16 @@ def test_what_rests_is_said_to_rest(linked):
     words = tab.inner_text(".words")
     assert "balls 2 and 3 rest and" in words
     assert "almost" not in words
+    tab = linked("speeds=1,0,0&restitution=0.99999&law=spheres")
+    tab.drawn()
+    assert "Less than 0.1\u00a0% of the energy is lost." in tab.inner_text(".words")
+
+
+def test_a_hit_of_many_steps_is_drawn(linked):
+    tab = linked("speeds=1,0,0,0,0&masses=20,0.05,20,0.05,20&law=springs&stiffness=0.1")
+    assert len(tab.drawn()["after"]) == 5
+    assert tab.evaluate(f"{EXPLORER}.state.record.path.length") > 60_000
+    assert tab.locator(".pictures polyline").count() >= 5  # of each ball's velocity one
 
 
 @pytest.mark.parametrize(

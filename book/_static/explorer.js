@@ -173,7 +173,10 @@
           state.set(state.setting);
           if (state.guessing) state.restart(false);
         }),
-        sound: on(() => (this.audio = this.audio ? null : new AudioContext())),
+        sound: on(() => {
+          this.audio?.close();
+          this.audio = this.audio ? null : new AudioContext();
+        }),
         beside: on((chosen) => state.beside(chosen)),
         speed: on((speed) => state.pull([[concerned().balls[0], speed]])),
         scope: on((scope) => (view.scope = scope)),
@@ -335,9 +338,10 @@
       this.last = now;
       const { clock, moves } = this.state;
       const running = clock.playing && moves && this.visible && !this.stage.drags.size;
+      const begins = clock.inside === null; // in slow motion a hit ends later
       if (running && this.state.advance(seconds)) {
         this.stale = true;
-        this.sound();
+        if (begins) this.sound();
       }
       const scenery = this.state.scenery();
       if (this.stale) this.draw(scenery);
@@ -351,7 +355,7 @@
     sound() {
       const { clock, swing } = this.state;
       const { before, happened } = swing.hit(swing.latest(clock.time));
-      if (!this.audio || !happened || clock.inside > 0) return;
+      if (!this.audio || !happened) return;
       click(this.audio, Math.min(1, Math.max(...before.slice(1).map((v, c) => before[c] - v))));
     }
 

@@ -10,7 +10,7 @@
     collisions: ({ record }) => (record ? String(sum(record.collisions)) : ""),
     back: ({ hit }) => {
       const back = hit.after?.flatMap((v, ball) => (v < -1e-9 ? [ball + 1] : [])) ?? [];
-      return back.length ? `ball${back.length > 1 ? "s" : ""} ${back.join(" and ")}` : "none";
+      return back.length ? `ball${back.length > 1 ? "s" : ""} ${explorer.list(back)}` : "none";
     },
   };
 
@@ -60,14 +60,14 @@
 
   // What a guess says: while it is drawn, and once it is known how the balls leave.
   function inWords({ setting, hit, guess, now }) {
-    const { masses, restitution } = setting;
+    const { masses } = setting;
     const momentum = (row) => sum(row.map((v, ball) => masses[ball] * v));
     if (!guess.open) {
       const before = momentum(hit.before);
       const share = Math.abs(before) > 1e-9 && percent(momentum(now) / before);
       const moves = share ? `${share} of the momentum and ` : "";
       const energy = percent(kept(masses, hit.before, now));
-      const lossless = explorer.law(setting) === "springs" || restitution.every((e) => e === 1);
+      const lossless = explorer.lossless(setting);
       const full = "100\u00a0%";
       let aim = lossless ? `Fill both, to ${full}.` : `Fill momentum, to ${full}; of energy some is lost.`;
       if (lossless && share === full && energy === full) aim = "Both are kept. Other guesses keep both, too.";
@@ -88,12 +88,13 @@
     const next = make("p", {}, make("b", {}, "Now you. "), task ?? "");
     const node = make("div", { class: "question" }, make("p", {}, make("b", {}, ask)), list?.node ?? "", told);
     const after = make("div", { class: "question" }, next); // below the cradle: nothing jumps
-    function show({ guess, hit, record, now }) {
+    function show({ guess, hit, record, now, number }) {
       const open = !guess || guess.open;
       next.hidden = !(open && task);
       if (!list) return;
       list.node.inert = open;
       list.show(guess?.answer ?? null);
+      if (guess?.open && number > 0) return; // the question is that of the first hit
       const right = open && guess && ANSWERS[answer]({ hit, record, now });
       if (!right) told.textContent = "";
       else if (!guess.answer) told.textContent = `Answer: ${right}.`;

@@ -256,7 +256,7 @@
       const focused = plot.contains(document.activeElement);
       const space = box(plot, 7);
       space.width = Math.min(space.width, 1.25 * space.height);
-      const back = firstAfter?.filter((v) => v < 0).length;
+      const back = firstAfter?.filter((v) => v < -1e-9).length;
       plot.innerHTML = map.svg(space, setting, PATTERNS[back] ?? "no answer");
       if (focused) plot.querySelector(".point").focus({ preventScroll: true });
       const { left, right, top, bottom } = map.plot;

@@ -51,8 +51,8 @@
 
   // A little more than the numbers need, so that no line lies on an edge.
   function span(values, least = 0.1) {
-    const low = Math.min(0, ...values);
-    const high = Math.max(0, ...values);
+    const low = values.reduce((least, value) => Math.min(least, value), 0); // of too many for arguments
+    const high = values.reduce((most, value) => Math.max(most, value), 0);
     const margin = 0.06 * Math.max(high - low, least);
     return [low - margin, high + margin];
   }
@@ -181,6 +181,8 @@
     const [right, left] = [parts.filter(({ p }) => p > 0), parts.filter(({ p }) => p < 0)];
     const [total, last, most] = [of(before), of(now), right.map(({ p }) => p)].map(sum);
     const [low, high] = [Math.min(0, total, last), Math.max(0, total, most)];
+    // Where it is kept, rounding alone may change its last digit.
+    const told = Math.abs(last - total) > 1e-4 * sum(of(before).map(Math.abs)) ? last : total;
     const x = (p) => px(1.7 * em + ((p - low) / Math.max(high - low, 1e-9)) * (width - 3.4 * em));
     const thick = 0.6 * em;
     let end = 0;
@@ -200,7 +202,7 @@
     const names = apart ? name(x(0), "0") + name(x(total), "before") : name(x(0), "0, before");
     return picture(
       { width, height },
-      `Momentum: ${fixed(last)}, before the hit ${fixed(total)} kg m/s`,
+      `Momentum: ${fixed(told)}, before the hit ${fixed(total)} kg m/s`,
       tick(0, "zero") + pieces.join("") + tick(total, "cursor") + names,
     );
   }

@@ -20,6 +20,7 @@
   const LAWS = ["rule", "spheres", "springs"];
   const NUMBER = { spheres: ["gap", 0], springs: ["stiffness", 1] };
   const law = (setting) => setting.law ?? LAWS[0];
+  const lossless = (setting) => law(setting) === "springs" || setting.restitution.every((e) => e === 1);
   // m/s; the square of a smaller speed, an energy, might be no number.
   const SLOWEST = 1e-6;
 
@@ -210,7 +211,7 @@
       given
         .get(name)
         .split(",")
-        .map((word) => (word === "" ? NaN : +word));
+        .map((word) => (word.trim() === "" ? NaN : +word));
     const listed = Math.max(
       (given.get("masses") ?? "").split(",").length,
       (given.get("letters") ?? "").length,
@@ -233,7 +234,7 @@
       letters,
     };
     const named = given.get("law") ?? LAWS[0];
-    const [number, usual] = NUMBER[named] ?? [];
+    const [number, usual] = LAWS.includes(named) ? (NUMBER[named] ?? []) : [];
     if (named !== LAWS[0]) plainly.law = named;
     if (number) plainly[number] = given.has(number) ? numbers(number)[0] : usual;
     // What an address leaves out, the letters say where they can.
@@ -303,6 +304,7 @@ print(run)
     fromFragment,
     law,
     lettered,
+    lossless,
     plain,
     pulled,
     python,

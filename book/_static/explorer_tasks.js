@@ -7,15 +7,20 @@
   const STILL = 0.005; // of the fastest ball's speed
 
   const back = (v) => v.filter((speed) => speed < -STILL).length;
+  // Above its bound a ratio is that of the bound.
+  const smallestRatio = (setting) => {
+    const { forward, backward } = explorer.boundedRatios(setting);
+    return Math.min(...forward, ...backward);
+  };
   const whole = ({ masses, before, v }) => kept(masses, before, v) > 1 - 1e-4;
   const TASKS = [
     [1, "Lose no energy, and make the last two balls leave at the same speed.",
       (hit) => whole(hit) && hit.last > 0.1 && Math.abs(hit.v.at(-2) - hit.last) < STILL],
-    [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1.2],
+    [1, "Send the last ball off faster than the striker came.", ({ last }) => last > 1 + STILL],
     [2, "Lose more than half of the energy, and let the last ball leave with more than half of the striker's speed.",
       ({ masses, before, v, last }) => kept(masses, before, v) < 0.5 && last > 0.5],
     [3, "Stop the striker dead, with ratio 0.1 or more. (After chapter 3 you can do this with a pencil.)",
-      ({ v, setting }) => explorer.law(setting) === "rule" && Math.abs(v[0]) < STILL && Math.min(...setting.forward, ...setting.backward) >= 0.1],
+      ({ v, setting }) => explorer.law(setting) === "rule" && Math.abs(v[0]) < STILL && smallestRatio(setting) >= 0.1],
     [3, "Lose no energy, and make exactly two balls come back.", (hit) => whole(hit) && back(hit.v) === 2],
     [3, "Lose no energy, and make balls 1 and 2 collide ten times in one hit.",
       (hit) => whole(hit) && hit.record.collisions[0] >= 10],

@@ -78,8 +78,8 @@
     }
     const lost = 1 - kept(masses, hit.before, hit.after);
     const percent = lost < 0.0005 ? "Less than 0.1" : fixed(100 * lost, lost < 0.1 ? 1 : 0);
-    // Contact forces are followed to five digits.
-    const all = Math.abs(lost) < (explorer.law(setting) === "rule" ? 1e-9 : 1e-4);
+    // Contact forces are followed to five digits, which do not tell a small loss from none.
+    const all = explorer.lossless(setting) || (explorer.law(setting) === "rule" && Math.abs(lost) < 1e-9);
     const said = [
       `Before ${hitName(number)}, ${motions(hit.before)}.`,
       `After it, ${motions(hit.after)}.`,
@@ -109,6 +109,7 @@
     hitName,
     kept,
     kinetic,
+    list,
     outcomeInWords: outcome,
     sum,
   });
