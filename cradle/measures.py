@@ -105,10 +105,11 @@ def effective_ratio(trace: Trace) -> float:
 
     It lies between 0 and its bound (Eq. 34) and acts in both directions, as in
     ``ImpulseCorrelation(ratio)``; in a direction with a smaller bound it is held at that.  If
-    several ratios give the outcome within 1e-6 of the fastest closing speed, it is the lowest.
-    Outcomes that lose no energy differ by one number, so that one ratio often suffices; with losses
-    there is in general none, and the `ValueError` names the one that comes nearest.  Other than
-    three balls, and balls of which none approach, raise a `ValueError` too.
+    several ratios give the outcome within 1e-6 of the fastest closing speed, it is the lowest that
+    256 steps find (with a light middle ball there may be a lower one).  Outcomes that lose no
+    energy differ by one number, so that one ratio often suffices; with losses there is in general
+    none, and the `ValueError` names the one that comes nearest.  Other than three balls, and balls
+    of which none approach, raise a `ValueError` too.
 
     Examples
     --------
@@ -143,16 +144,15 @@ def effective_ratio(trace: Trace) -> float:
         brentq(lambda ratio: float(distances(ratio)[ball]), grid[k], grid[k + 1], xtol=1e-15)
         for k in np.flatnonzero(side[:-1] * side[1:] < 0.0)
     ]
-    # The outcome can be that of an end, and rounding hide the change of sign there.
-    candidates = np.array([*found, *grid[side == 0.0], 0.0, bound])
+    near = np.abs(missed).max(axis=1).argmin()
+    finer = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, 256)], 257)
+    # The outcome can be that of an end, and rounding hide the change of sign there; or turn back.
+    candidates = np.array([*found, *grid[side == 0.0], 0.0, bound, *finer])
     far = np.abs(distances(candidates)).max(axis=1)
     if (far <= 1e-6).any():
         # The smallest that fits; but an end that fits beside a root gives way to the root.
         beside = candidates <= candidates[far <= 1e-6].min() + grid[1]
         return float(candidates[np.argmin(np.where(beside, far, np.inf))])
-    near = np.abs(missed).max(axis=1).argmin()
-    finer = np.linspace(grid[max(near - 1, 0)], grid[min(near + 1, 256)], 257)
-    misses = np.abs(distances(finer)).max(axis=1)
     told = f"no ratio in [0, {bound:.6g}] gives the velocities {target.tolist()}; the nearest"
-    far = f"{misses.min():.3g} of the fastest closing speed"
-    raise ValueError(f"{told}, {finer[misses.argmin()]:.6g}, misses by {far}")
+    least = f"{far.min():.3g} of the fastest closing speed"
+    raise ValueError(f"{told}, {candidates[far.argmin()]:.6g}, misses by {least}")

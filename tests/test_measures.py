@@ -52,6 +52,14 @@ def test_two_ratios_one_outcome():
     assert effective_ratio(other) == 0
 
 
+def test_an_effective_ratio_that_no_step_brackets_is_found():
+    """With a light ball between others velocities turn back within a step; one that fits is one."""
+    chain = Chain([1.708, 0.009418937, 1.365], [1, 0, 0], [0.76, 0.79])
+    trace = collide(chain, ImpulseCorrelation(0.3133, excess="saturate"))
+    after = collide(chain, ImpulseCorrelation(effective_ratio(trace), excess="saturate"))
+    np.testing.assert_allclose(after.velocities, trace.velocities, rtol=0, atol=1e-6)
+
+
 def test_no_effective_ratio():
     """Energy is lost elsewhere than under a ratio; the nearest one is told."""
     trace = collide(striking(e=0.5), EnergyDistribution(1.0))

@@ -133,6 +133,8 @@ BATCH = [
     # A batch without a chain is checked all the same.
     ({"masses": np.ones((0, 3)), "velocities": [np.nan, 0, 0]}, "velocities[0] = nan; must be"),
     ({"masses": np.ones((0, 3)), "forward": 2}, "forward = 2.0; must lie in [0, 1]"),
+    # Two balls have no ratio, but one is given.
+    ({"masses": [1, 1], "velocities": [1, 0], "forward": 7}, "forward = 7.0; must lie in [0, 1]"),
 ]  # fmt: skip
 
 #: Of a model, and of a batch.  Holding contacts at their bounds excuses no ratio outside 0 and 1.

@@ -64,7 +64,7 @@ def collide(
         trace = model.solve(chain, record=record, progress=progress)
         advice = "; record=True keeps all, record=False none"
     elif record is not None:
-        raise TypeError(f"{type(model).__name__} always keeps its path: record does not apply")
+        raise TypeError(f"{type(model).__name__} has a path of its own: record does not apply")
     elif flag("progress", progress) and isinstance(model, SpringChain):
         trace, advice = model.solve(chain, progress=True), ""
     else:

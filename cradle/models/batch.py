@@ -99,7 +99,7 @@ def outcomes(
     given |= {"forward": forward, "backward": forward if backward is None else backward}
     arrays, lead = shaped(given, (0, 0, 1, 2, 2))  # the kernel checks whether these are in range
     n, count = arrays[0].shape[-1], math.prod(lead)
-    if count == 0:
+    if count == 0 or n == 2:  # then no chain has a ratio, but one is given
         paper.check_values(options.bounded, *given.values())
     whole, large = outputs(count, n), count * n >= LARGE
 
