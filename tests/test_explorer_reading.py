@@ -56,7 +56,7 @@ WRONG_ADDRESSES = {
     "restitution=1.2": "restitution[0] = 1.2; must lie in [0, 1]",
     "masses=1,2&speeds=1,0,0": "speeds has 3 values; 2 balls need 2",
     "speeds=0,1": "speeds[1] = 1; must not exceed the one before it",
-    "speeds=1": "1 balls; must be 2 to 7",
+    "speeds=1": "1 ball; must be 2 to 7",
     "masses=": "masses[0] = NaN; must lie in [0.01, 100]",
     "masses=1e400": "masses[0] = Infinity; must lie in [0.01, 100]",
     "restitution=1e-40": "restitution[0] = 1e-40",
@@ -784,6 +784,9 @@ def test_what_rests_is_said_to_rest(linked):
     tab = linked("speeds=1,0,0&restitution=0.99999&law=spheres")
     tab.drawn()
     assert "Less than 0.1\u00a0% of the energy is lost." in tab.inner_text(".words")
+    tab = linked("speeds=1,0&law=spheres")
+    tab.drawn()
+    assert "ball 1 rests and" in tab.inner_text(".words")
 
 
 def test_a_hit_of_many_steps_is_drawn(linked):

@@ -31,7 +31,7 @@
   function refusal(setting) {
     const count = setting.masses.length;
     if (!(count >= LIMITS.balls[0] && count <= LIMITS.balls[1]))
-      return `${count} balls; must be ${LIMITS.balls[0]} to ${LIMITS.balls[1]}`;
+      return `${count} ball${count === 1 ? "" : "s"}; must be ${LIMITS.balls[0]} to ${LIMITS.balls[1]}`;
     for (const [name, fewer] of Object.entries(LENGTHS)) {
       const [low, high] = LIMITS[name];
       if (setting[name].length !== count - fewer)

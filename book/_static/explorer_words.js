@@ -13,8 +13,8 @@
     return `${words.slice(0, -1).join(", ")} and ${words[words.length - 1]}`;
   }
 
-  // Below this, m/s, a velocity is the rounding of zero.
-  const ROUNDING = 1e-12;
+  // Below this, m/s, a velocity is the rounding of zero, or what contact forces leave out.
+  const ROUNDING = 1e-7;
 
   function way(v) {
     if (Math.abs(v) < ROUNDING) return ["rests", "rest"];
