@@ -449,6 +449,15 @@ def test_pages_do_not_jump(browser, html: Path):
     tab.close()
 
 
+def test_a_cradle_is_drawn_before_a_frame_can_be_painted(browser, html: Path):
+    """Else what a reader is to see after the first hit alone flashes up."""
+    tab = browser.new_page()
+    tab.add_init_script("globalThis.requestAnimationFrame = () => 1")
+    tab.goto((html.with_name("light") / "book" / "explorer.html").as_uri())
+    assert tab.evaluate("document.querySelector('.cradle-explorer').className").endswith("calm")
+    tab.close()
+
+
 def test_print_from_dark_mode(still):
     """Black on white, with all that is still to be computed; then the page is as it was."""
     tab = still("#scene=map", color_scheme="dark", stopped=True)

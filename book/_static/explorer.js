@@ -59,7 +59,8 @@
       this.build();
       if (this.page) this.readAddress();
       this.watch();
-      this.changed();
+      this.stale = true;
+      this.tick(performance.now()); // at once: a frame could be painted before the next one
     }
 
     // --- the page's elements --------------------------------------------------------------------
