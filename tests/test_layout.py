@@ -452,7 +452,10 @@ def test_pages_do_not_jump(browser, html: Path):
 def test_a_cradle_is_drawn_before_a_frame_can_be_painted(browser, html: Path):
     """Else what a reader is to see after the first hit alone flashes up."""
     tab = browser.new_page()
-    tab.add_init_script("globalThis.requestAnimationFrame = () => 1")
+    # Nor does the page's theme, once it is set, draw it anew.
+    tab.add_init_script(
+        "requestAnimationFrame = () => 1; MutationObserver.prototype.observe = () => {}"
+    )
     tab.goto((html.with_name("light") / "book" / "explorer.html").as_uri())
     assert tab.evaluate("document.querySelector('.cradle-explorer').className").endswith("calm")
     tab.close()
