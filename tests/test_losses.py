@@ -9,6 +9,7 @@ from chains import magnitudes, uniform
 from cradle import (
     Chain,
     ConstantLoss,
+    EnergyDistribution,
     ImpactNotFinished,
     ImpulseCorrelation,
     Pendulums,
@@ -50,6 +51,16 @@ def test_each_contact_has_the_restitution_of_its_fastest_closing(seed):
     assert trace.energy_loss == pytest.approx(
         chain.kinetic_energy - 0.5 * (chain.masses * trace.velocities) @ trace.velocities
     )
+
+
+def test_energy_distribution_tells_speeds_at_its_steps():
+    """Linear springs: after t the second contact closes at (cos t - cos(3^.5 t)) / 2."""
+    t = np.linspace(0, 2, 100_001)
+    fastest, told = 0.5 * (np.cos(t) - np.cos(np.sqrt(3) * t)).max(), []
+    for rtol, least in ((1e-9, 0.97), (1e-13, 0.997)):
+        law = SpeedDependent(EnergyDistribution(1.0, 1, rtol=rtol), lambda u: told.append(u) or 1.0)
+        collide(Chain([1, 1, 1], [1, 0, 0]), law)
+        assert least * fastest < told[-1] < fastest * (1 + 1e-9)
 
 
 def test_restitutions_that_never_agree_are_said():
