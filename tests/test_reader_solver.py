@@ -13,8 +13,6 @@ import reader_solver  # isort: skip
 import solver_numpy  # isort: skip  (both are found by way of pyproject.toml)
 
 WHOLE = ".reader-solver:not([data-piece])"
-#: Timers of the page that tests need not wait for.
-HASTE = "{ const own = setTimeout; setTimeout = (act, wait) => own(act, wait / 100); }"
 
 
 @pytest.fixture(scope="module")
@@ -194,10 +192,8 @@ def test_right_wrong_and_endless(visit, solver):
         editor(solver.replace(right, wrong)).told("An error")
         assert hint in editor.host.locator(".wrong").inner_text()
     # What is printed is shown, and a loop without end is stopped; then all goes on.
-    tab.evaluate(HASTE)
     editor("print('here')\nwhile True:\n    pass")
     tab.wait_for_selector(f"{WHOLE} .printed:has-text('here')", timeout=PATIENCE)
-    editor.told("press Stop")
     (worker,) = tab.workers
     with worker.expect_event("close"):  # the loop does not go on unseen
         editor.stop()
@@ -292,3 +288,88 @@ def test_each_editor_keeps_what_was_written(page):
     assert other.area.input_value() == before
     assert "def three_balls" in before
     assert one.host.locator(".count").inner_text() == "1\n2"
+
+
+def test_a_run_without_end_is_stopped(visit, solver):
+    """It may fill all memory, and the browser would then give up the page with what is written."""
+    tab = with_whole(visit(chapter="own_solver", stopped=True))
+    editor = Editor(tab)
+    with tab.expect_event("worker") as begun:
+        editor("path = []\nwhile True:\n    path.append(1)")
+    editor.told("running")
+    tab.clock.run_for(5000)
+    editor.told("press Stop")
+    with begun.value.expect_event("close"):
+        tab.clock.run_for(15000)
+    editor.told("Stopped after 20 s.")
+    assert editor(solver).told("5 of 5 checks passed") == (5, 0)
+    tab.clock.run_for(20000)
+    editor.told("5 of 5 checks passed")
+
+
+@pytest.mark.parametrize(
+    ("lines", "line", "words"),
+    [
+        ("def f():\n    x = 1\n      y = 2\n    return x", 3, "unexpected indent"),
+        ("  x = 1\nprint(x)", 1, "unexpected indent"),
+        (
+            "def f(n):\n    return g(n)\ndef g(n):\n    return f(n)\nf(0)",
+            None,
+            "A function calls itself without end.",
+        ),
+        ("def three_balls(*given):\n    return 5", None, "asked for three_balls([1,1,1], [1,0,0]"),
+    ],
+)
+def test_errors_are_plain(page, lines, line, words):
+    editor = Editor(page)
+    editor(lines).told(f"An error in line {line}." if line else "An error")
+    told = editor.host.locator(".wrong").inner_text()
+    assert words in told
+    assert told.count("\n") < 30
+
+
+def test_long_output_says_that_there_is_more(page):
+    editor = Editor(page)
+    editor("for k in range(20000):\n    print(k)").told("An error.")
+    printed = editor.host.locator(".printed")
+    assert printed.inner_text().endswith("more is not shown")
+    assert printed.bounding_box()["height"] < 400  # the checks stay near
+
+
+def test_an_error_selects_nothing_in_other_lines(page):
+    """Who goes on writing during a run would write over what an error selects."""
+    editor = Editor(page)
+    editor.area.fill("\n\n\nwrong")
+    editor.host.evaluate(
+        """async (host) => {
+          host.querySelector("button").click();
+          while (!/running/.test(host.querySelector(".told").textContent))
+            await new Promise((done) => setTimeout(done));
+          host.querySelector("textarea").value = "one\\ntwo\\nthree\\nfour";
+        }"""
+    )
+    editor.told("An error in line 4.")
+    assert editor.area.evaluate("(node) => node.selectionStart === node.selectionEnd")
+
+
+def test_a_press_by_key_keeps_the_focus(page, solver):
+    editor = Editor(page)
+    editor.area.fill(solver)
+    editor.host.locator("button").first.press("Space")
+    editor.told("5 of 5 checks passed")
+    page.keyboard.press("Space")  # without it this would scroll
+    editor.told("5 of 5 checks passed")
+    assert page.evaluate("document.activeElement.textContent") == "Run"
+
+
+def test_what_was_written_is_there_after_a_way_back(visit):
+    tab = visit(chapter="own_solver")
+    editor = Editor(tab, piece_of("rates"))
+    editor.area.fill("mine")
+    tab.wait_for_function("history.state?.rates === 'mine'")
+    tab.locator("a.right-next").first.click()
+    tab.wait_for_function("!document.querySelector('.reader-solver')")
+    tab.go_back()
+    assert editor.area.input_value() == "mine"
+    tab.reload()
+    assert editor.area.input_value() == "mine"

@@ -8,6 +8,8 @@
   const SAME = 1e-9; // m/s
   const MOST = 12; // numbers of a row that are shown
   const LONG = 4000; // milliseconds after which a run may be endless
+  const LONGEST = 20000; // milliseconds of a run; one without end may fill all memory
+  const KEEP = 500; // milliseconds after the last letter
 
   function make(kind, attributes = {}, ...children) {
     const node = document.createElement(kind);
@@ -40,7 +42,9 @@
     const piece = host.dataset.piece ?? "";
     const { own, rest } = texts[piece];
     let worker = null;
-    let slow = 0;
+    let running = false; // or Python is being loaded for it
+    let timers = [];
+    let saving = 0;
 
     // --- the editor -----------------------------------------------------------------------------
     const count = make("pre", { class: "count", "aria-hidden": true });
@@ -50,7 +54,11 @@
       autocomplete: "off",
       wrap: "off",
       "aria-label": `your ${piece || "solver"}, in Python`,
-      oninput: () => number(),
+      oninput: () => {
+        number();
+        clearTimeout(saving);
+        saving = setTimeout(keep, KEEP);
+      },
       onkeydown: (event) => key(event),
     });
     function number() {
@@ -58,8 +66,10 @@
       editor.rows = rows;
       count.textContent = Array.from({ length: rows }, (_, k) => k + 1).join("\n");
     }
+    // Whoever comes back to the page, or loads it again, finds what was written.
+    const keep = () => history.replaceState({ ...history.state, [piece]: editor.value }, "");
     function key(event) {
-      if (event.key !== "Enter") return;
+      if (event.key !== "Enter" || event.isComposing) return;
       if (event.ctrlKey || event.metaKey) run();
       else {
         // A new line begins below the one before; after a colon, further in.
@@ -71,9 +81,9 @@
     }
     // --- what comes out -------------------------------------------------------------------------
     const start = make("button", { type: "button", class: "main", onclick: () => run() }, "Run");
-    const halt = make("button", { type: "button", onclick: () => stop("Stopped.") }, "Stop");
+    const halt = make("button", { type: "button", onclick: () => worker && stop("Stopped.") }, "Stop");
     const told = make("span", { class: "told", role: "status" });
-    const printed = make("pre", { class: "printed", "aria-label": "what your lines print" });
+    const printed = make("pre", { class: "printed", role: "region", tabindex: 0, "aria-label": "what your lines print" });
     const wrong = make("pre", { class: "wrong", role: "alert" });
     // First single calls of the reader's function, then whole impacts.
     const first = calls[piece] ?? [];
@@ -115,21 +125,26 @@
       single.hidden = !is || !first.length;
       list.hidden = !is;
     }
+    // A button that may not be pressed keeps the focus of who has pressed it.
+    function may(run, stop) {
+      start.setAttribute("aria-disabled", !run);
+      halt.setAttribute("aria-disabled", !stop);
+    }
     function stop(words) {
       worker?.terminate();
       worker = null;
-      clearTimeout(slow);
-      halt.disabled = true;
-      start.disabled = false;
+      running = false;
+      timers.forEach(clearTimeout);
+      may(true, false);
       told.textContent = words;
     }
-    function hear({ printed: text, number: check, found, broken, error, line, done }) {
+    function hear(code, { printed: text, number: check, found, broken, error, line, done }) {
       if (text) printed.textContent += text;
       if (found) show(check, found);
       if (broken) results[check].textContent = "an error: no answer";
       const empty = line && error?.includes("NotImplementedError");
       if (error && !empty) wrong.textContent = error.trim();
-      if (error && line) mark(line);
+      if (error && line && editor.value === code) mark(line);
       if (!done) return;
       const passed = list.querySelectorAll(".passed").length;
       const missed = single.querySelectorAll(".missed").length;
@@ -147,8 +162,9 @@
       editor.focus({ preventScroll: true });
     }
     async function run() {
-      if (start.disabled) return;
-      start.disabled = true;
+      if (running) return;
+      running = true;
+      may(false, false);
       told.textContent = "Python is being loaded \u2026";
       printed.textContent = wrong.textContent = "";
       results.forEach((result) => Object.assign(result, { className: "", textContent: "" }));
@@ -161,17 +177,21 @@
       }
       const code = new Blob([globalThis.cradlePython], { type: "text/javascript" });
       const address = URL.createObjectURL(code);
-      worker = new Worker(address);
+      const own = (worker = new Worker(address));
       URL.revokeObjectURL(address);
-      worker.onmessage = ({ data }) => hear(data);
-      worker.onerror = ({ message }) => hear({ error: message, done: true });
-      worker.postMessage({ code: editor.value, rest, asked: asked.map(({ asked }) => asked) });
+      const written = editor.value;
+      const listen = (said) => own === worker && hear(written, said); // not to one that was stopped
+      own.onmessage = ({ data }) => listen(data);
+      own.onerror = ({ message }) => listen({ error: message, done: true });
+      own.postMessage({ code: written, rest, asked: asked.map(({ asked }) => asked) });
       reveal(true);
-      halt.disabled = false;
+      may(false, true);
       told.textContent = "running \u2026";
-      slow = setTimeout(() => {
-        told.textContent = "Still running. If a loop has no end, press Stop and bound it: for k in range(100).";
-      }, LONG);
+      const bound = "bound it: for k in range(100).";
+      timers = [
+        setTimeout(() => (told.textContent = `Still running. If a loop has no end, press Stop and ${bound}`), LONG),
+        setTimeout(() => stop(`Stopped after ${LONGEST / 1000} s. If a loop has no end, ${bound}`), LONGEST),
+      ];
     }
 
     host.replaceChildren(
@@ -184,8 +204,8 @@
       list,
     );
     host.classList.add("live");
-    halt.disabled = true;
-    editor.value = own;
+    may(true, false);
+    editor.value = history.state?.[piece] ?? own;
     number();
   }
 
