@@ -7,7 +7,7 @@ restitution e2 and e3; alpha is the forward ratio at ball 2.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cradle.input.values import ABOVE_ZERO, PART, Vector, checked, numbers, one_number
+from cradle.input.values import ABOVE_ZERO, PART, Vector, checked, numbers, one_number, shaped
 from cradle.kernel.state import LIMITS
 
 #: What is asked of a restitution that divides.
@@ -116,7 +116,7 @@ def largest_ratios(
     ----------
     masses : array_like, shape (..., N)
         Masses of two or more balls, kg, above 0.
-    forward, backward : array_like, shape (..., N - 2)
+    forward, backward : array_like, shape (..., N - 2) or ()
         Ratios at the interior balls, 0 to 1; their bounds are returned, each ball's in its place.
 
     Examples
@@ -125,15 +125,10 @@ def largest_ratios(
     >>> [bound.tolist() for bound in largest_ratios([1, 1, 1, 1], [0.5, 0.5], [0.5, 0.5])]
     [[0.6666666666666666, 0.5], [0.5, 0.6666666666666666]]
     """
-    m = checked("masses", masses, *ABOVE_ZERO)
-    if m.shape[-1:] < (2,):
-        raise ValueError(f"masses has shape {m.shape}; must be (..., N) with N >= 2")
-    f, b = checked("forward", forward, *PART), checked("backward", backward, *PART)
-    size = m.shape[-1] - 2
-    for name, ratio in (("forward", f), ("backward", b)):
-        if ratio.shape[-1:] != (size,):
-            rule = f"must be (..., {size}) for {size + 2} balls: one number for each inner ball"
-            raise ValueError(f"{name} has shape {ratio.shape}; {rule}")
+    given = {"masses": checked("masses", masses, *ABOVE_ZERO)}
+    given |= {"forward": checked("forward", forward, *PART)}
+    given |= {"backward": checked("backward", backward, *PART)}
+    (m, f, b), _ = shaped(given, (0, 2, 2))
 
     def bound(m: Vector, ratio: Vector) -> Vector:
         onward = np.zeros(ratio.shape)

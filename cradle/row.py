@@ -267,8 +267,9 @@ def step_rows(rows: Sequence[Row], duration: float) -> None:
 
     The first row's engine makes the step; errors are those of `Row.step`.
     """
-    if not (isinstance(rows, Sequence) and rows and all(isinstance(one, Row) for one in rows)):
-        raise ValueError(f"rows = {shown(rows)}; must be one Row or more: the first has the engine")
+    whole = isinstance(rows, Sequence) and rows and all(isinstance(one, Row) for one in rows)
+    if not whole or len({*rows}) < len(rows):
+        raise ValueError(f"rows = {shown(rows)}; must be different Rows: the first has the engine")
     duration = one_number("duration", duration, *ABOVE_ZERO)
     begun = [row._before(duration) for row in rows]
     rows[0].bodies.advance(duration)

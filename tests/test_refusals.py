@@ -169,8 +169,11 @@ SHAPES = [
 
 BOUNDS = [
     ((1, 0.5, 0.5), "masses has shape (); must be (..., N) with N >= 2"),
-    ((ONES, 0.5, [0.5]), "forward has shape (); must be (..., 1) for 3 balls"),
-    ((ONES, [0.5], [0.5, 0.5]), "backward has shape (2,); must be (..., 1) for 3 balls"),
+    ((ONES, [[0.5]], [0.5, 0.5]), "backward has shape (2,); must be () or (..., 1) for 3 balls"),
+    (
+        ([ONES] * 2, [[0.5]] * 3, 0.5),
+        "leading axes do not broadcast: masses (2, 3), forward (3, 1)",
+    ),
     (([1, 0, 1], [0.5], [0.5]), "masses[1] = 0.0; must be above 0"),
     (([1, 1, INF], [0.5], [0.5]), "masses[2] = inf; must be finite"),
     ((ONES, [-0.1], [0.5]), "forward[0] = -0.1; must lie in [0, 1]"),

@@ -320,6 +320,14 @@ def test_pushes_that_an_engine_keeps_for_its_next_step_tell_nothing_of_masses():
     assert bodies.angles[-1] > 0.05
 
 
+def test_a_row_is_stepped_once():
+    """Twice in one step its balls would be pushed twice."""
+    row = two_rows()[0][1]
+    for rows in ([row, row], [], [None], row):
+        with pytest.raises(ValueError, match=r"^rows = .*; must be different Rows: the first has"):
+            step_rows(rows, 1 / 60)
+
+
 def test_two_rows_of_one_world_are_stepped_together():
     together = two_rows()
     for _ in range(120):

@@ -4,7 +4,7 @@ A refusal names the value, its place and the rule: `masses[1] = -1.0; must be ab
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NewType, TypeVar
 
 import numpy as np
@@ -125,6 +125,31 @@ def row_of(name: str, kept: Any, size: int, balls: int) -> Vector:
     if not isinstance(kept, float) and len(kept) != size:
         raise ValueError(f"{name} has {len(kept)} values; {balls} balls need {size}, or one number")
     return np.full(size, kept)
+
+
+def shaped(
+    given: Mapping[str, ArrayLike], missing: tuple[int, ...]
+) -> tuple[list[Vector], tuple[int, ...]]:
+    """Return inputs as rows, shorter than the balls by what is `missing`, and their other axes."""
+    arrays = [numbers(name, values) for name, values in given.items()]
+    n = arrays[0].shape[-1] if arrays[0].ndim else 0
+    if n < 2:
+        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
+    if "velocities" in given and arrays[1].shape[-1:] != (n,):
+        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
+    for k, name in enumerate(given):
+        size = n - missing[k]
+        if arrays[k].ndim == 0:
+            arrays[k] = arrays[k].repeat(size)
+        elif arrays[k].shape[-1] != size:
+            rule = f"must be () or (..., {size}) for {n} balls"
+            raise ValueError(f"{name} has shape {arrays[k].shape}; {rule}")
+    leads = {array.shape[:-1] for array in arrays}
+    try:
+        return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
+    except ValueError:
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
+        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
 
 def checked_masses(masses: ArrayLike) -> Vector:

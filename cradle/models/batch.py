@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from cradle.chain import Chain
-from cradle.input.values import ArrayLike, NDArray, Vector, flag, numbers
+from cradle.input.values import ArrayLike, NDArray, Vector, flag, shaped
 from cradle.kernel import Inputs, Options, Outputs
 from cradle.kernel.state import FINISHED, REFUSED
 from cradle.models import correlation as paper
@@ -136,31 +136,6 @@ def fail(model: Any, chain: Chain, place: Sequence[Any]) -> NoReturn:
             error.add_note(f"in the batch it is chain {[int(k) for k in place]}")
         raise
     raise ImpactNotCertified(chain, model, "among others it stops, alone it does not")
-
-
-def shaped(
-    given: dict[str, ArrayLike], missing: tuple[int, ...]
-) -> tuple[list[Vector], tuple[int, ...]]:
-    """Return inputs as rows, shorter than the balls by what is `missing`, and their other axes."""
-    arrays = [numbers(name, values) for name, values in given.items()]
-    n = arrays[0].shape[-1] if arrays[0].ndim else 0
-    if n < 2:
-        raise ValueError(f"masses has shape {arrays[0].shape}; must be (..., N) with N >= 2")
-    if "velocities" in given and arrays[1].shape[-1:] != (n,):
-        raise ValueError(f"velocities has shape {arrays[1].shape}; must be (..., {n}), as masses")
-    for k, name in enumerate(given):
-        size = n - missing[k]
-        if arrays[k].ndim == 0:
-            arrays[k] = arrays[k].repeat(size)
-        elif arrays[k].shape[-1] != size:
-            rule = f"must be () or (..., {size}) for {n} balls"
-            raise ValueError(f"{name} has shape {arrays[k].shape}; {rule}")
-    leads = {array.shape[:-1] for array in arrays}
-    try:
-        return arrays, leads.pop() if len(leads) == 1 else np.broadcast_shapes(*leads)
-    except ValueError:
-        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(given, arrays, strict=True))
-        raise ValueError(f"leading axes do not broadcast: {shapes}") from None
 
 
 def in_order(

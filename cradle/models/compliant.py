@@ -12,7 +12,7 @@ from cradle.input import values as asked
 from cradle.input.values import ArrayLike, Vector
 from cradle.kernel.kinks import Law, Springs
 from cradle.kernel.state import FINISHED, REFUSED, UNFINISHED, UNSOUND
-from cradle.models.batch import fail, in_order, rows_of, shaped
+from cradle.models.batch import fail, in_order, rows_of
 from cradle.models.springs import COARSEST, FINEST, MOST_STEPS, TimedTrace, refused
 from cradle.runtime.job import DEFECTS, LARGE, follow, motions
 from cradle.trace import ImpactNotCertified, ImpactNotFinished, Trace
@@ -204,7 +204,7 @@ def spring_outcomes(
     given = {"masses": masses, "velocities": velocities, "stiffness": stiffness}
     given |= {"viscosity": viscosity, "gaps": gaps}
     asked.one_of("damping", damping, DAMPING)
-    arrays, lead = shaped(given, (0, 0, 1, 1, 1))
+    arrays, lead = asked.shaped(given, (0, 0, 1, 1, 1))
     n, count = arrays[0].shape[-1], math.prod(lead)
     if count == 0:
         check_rows(arrays)

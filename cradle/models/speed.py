@@ -13,7 +13,6 @@ from cradle.chain import Chain
 from cradle.input import values as asked
 from cradle.kernel.accuracy import LONGEST, MOST_HUNT
 from cradle.models import Model, a_model
-from cradle.models.batch import shaped
 from cradle.models.compliant import DAMPING, SpringChain
 from cradle.trace import ImpactNotFinished, Trace
 
@@ -196,7 +195,7 @@ def viscosity_from(
     given: dict[str, asked.ArrayLike] = {"masses": asked.checked_masses(masses)}
     given |= {"restitution": asked.checked("restitution", restitution, rule, least, 1.0)}
     given |= {"stiffness": asked.checked("stiffness", stiffness, *asked.ABOVE_ZERO)}
-    m, e, k = shaped(given, (0, 1, 1))[0]
+    m, e, k = asked.shaped(given, (0, 1, 1))[0]
     found, place = np.unique(np.minimum(e, part(0.0)), return_inverse=True)  # 1, but for rounding
     sought = [brentq(lambda a, x=x: part(a) - x, 0.0, most, xtol=1e-12) for x in found.tolist()]
     mass = m[..., :-1] / (m[..., :-1] + m[..., 1:]) * m[..., 1:]
