@@ -268,6 +268,16 @@ def test_figs_10_to_12_as_drawn():
     assert max(per_unit) - min(per_unit) < 0.01 * max(per_unit)  # one scale for all
 
 
+def test_two_things_to_see_in_the_ten_predictions():
+    spreads = {4: [], 5: [], 6: []}
+    for sequence in paper_sequences():
+        after = predicted(sequence).velocities
+        assert (min(after) < 0) == (sequence[1] == "D"), sequence
+        spreads[len(sequence)].append(float(max(after) - min(after)))
+    means = [np.mean(spreads[n]) for n in (4, 5, 6)]
+    assert means[0] > 1.1 * means[1] > 1.3 * means[2]
+
+
 def test_bands_of_the_ten_predictions():
     """Entries off by up to 0.01 at random: other draws, in the second solver."""
     rng, table_1 = np.random.default_rng(20), restitution_table()
