@@ -242,5 +242,8 @@ def colour(node, name: str) -> str:
 
 
 def code(style: str) -> str:
-    """Return a colour of a style, rgb(r, g, b), as #rrggbb."""
+    """Return a colour of a style, rgb(r, g, b) or color(srgb r g b), as #rrggbb."""
+    if style.startswith("color(srgb"):
+        parts = [round(255 * float(part)) for part in re.findall(r"[\d.]+", style)[:3]]
+        return "#" + "".join(f"{part:02x}" for part in parts)
     return "#" + "".join(f"{int(part):02x}" for part in re.findall(r"\d+", style)[:3])

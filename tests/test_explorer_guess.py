@@ -266,6 +266,14 @@ def test_a_question_of_a_chapter(still, name, setting, said, words, answered):
     assert not tab.state("covered")
     told = words if answered else f"Answer: {told}."
     assert tab.inner_text(".question .told") == told
+    # Screen readers hear it once, however often all is drawn.
+    tab.evaluate(
+        "new MutationObserver(() => (globalThis.again = true))"
+        ".observe(document.querySelector('.question .told'), { childList: true })"
+    )
+    tab.evaluate(f"{EXPLORER}.changed()")
+    tab.drawn()
+    assert tab.evaluate("globalThis.again") is None
     asked.get_by_role("button", name="Next hit", exact=True).click()  # the first one was asked for
     tab.drawn()
     assert tab.inner_text(".question .told") == told
@@ -308,6 +316,21 @@ def test_events_are_listed(still):
     tab.locator(".scrub input").fill("3")
     tab.drawn()
     assert tab.bars() == trace.path[rows[2][0]].round(2).tolist()
+
+
+def test_events_that_share_an_instant_are_marked_together(still):
+    tab = still(chapter="n_balls")
+    tab.act("read('speeds=1,0.5,0,0&forward=0')")
+    trace = collide(*chain_of(tab.drawn()))
+    total = trace.path_impulses.sum(axis=1)
+    rows = [k for k, event in enumerate(trace.events, 1) if event.kind != "maximum_compression"]
+    shared = [[np.isclose(total[row], total[other]) for other in rows] for row in rows]
+    assert np.sum(shared) == len(rows) + 2  # two of them share one
+    buttons = tab.locator(".events button").all()
+    for button, expected in zip(buttons, shared, strict=True):
+        button.click()
+        tab.drawn()
+        assert [one.get_attribute("aria-pressed") == "true" for one in buttons] == expected
 
 
 @pytest.mark.parametrize("name", ["n_balls", "problem"])

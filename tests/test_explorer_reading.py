@@ -7,7 +7,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 from explorer import EXPLORER, SETTING, chain_of, disc, same_outcome, settings
-from pages import FRAMES, MISFITS, colour, contrast, show
+from pages import FRAMES, MISFITS, code, colour, contrast, show
 
 from cradle import Chain, SpringChain, collide, paper_chain, post_impact_velocities
 from cradle.measures import bouncing_pattern
@@ -63,6 +63,7 @@ WRONG_ADDRESSES = {
     "letters=ABXBA": "letters = ABXBA",
     "alpha=0.1": "alpha is no part of a setting",
     "toString=1": "toString is no part of a setting",
+    "=3": "a value without a name is no part of a setting",
     "law=toString": "law = toString; must be rule or spheres or springs",
     "speeds=1, ,0": "speeds[1] = NaN",
     "speeds=1,%": "speeds[1] = NaN",
@@ -82,6 +83,8 @@ def test_wrong_addresses_are_refused(still):
         shown = tab.drawn()
         assert reason in tab.inner_text(".words"), fragment
         assert same_outcome(shown), fragment
+    tab.go_to("&speeds=1,0,0&&")
+    assert tab.drawn()["speeds"] == [1, 0, 0]
     tab.go_to("speeds%3D1%2C0")  # as some mail programs write it
     assert tab.drawn()["speeds"] == [1, 0]
 
@@ -189,6 +192,16 @@ def test_everything_by_keyboard(still):
         tab.keyboard.press(".")
         tab.drawn()
     assert tab.locator(".outcome h2").first.inner_text() == "After hit 2 (m/s)"
+
+
+def test_a_button_that_has_done_its_work_keeps_the_focus(still):
+    tab = still(stopped=True)
+    tab.push("Let go", 1000)
+    back = tab.get_by_role("button", name="Pull back", exact=True)
+    back.press("Space")
+    tab.clock.run_for(100)
+    assert back.get_attribute("aria-disabled") == "true"
+    assert tab.evaluate("document.activeElement.textContent") == "Pull back"
 
 
 def test_buttons_that_stay_pressed_say_so(still):
@@ -425,6 +438,36 @@ def test_fits_and_can_be_read(still, width: int):
         tab.hover("button.main")
         main = tab.locator("button.main")
         assert contrast(colour(main, "color"), colour(main, "backgroundColor")) > 7
+
+
+def test_marks_can_be_seen(still):
+    """Balls, also pale ones, the zone of ratios above their bound, sliders of several values."""
+    tab = still("#speeds=1,0,0,0,0,0,0&masses=1,2,1,1,1,1,1&forward=0.9&picture=sweep")
+    tab.drawn()
+    marks = [(disc(ball), "stroke") for ball in range(7)]
+    marks += [(f".outcome .drawn rect[fill='var(--ball-{ball})']", "fill") for ball in range(7)]
+    slider = tab.locator(".slider.several input[type=range]").first
+    for mode, ground in (("light", "#ffffff"), ("dark", "#121212")):
+        show(tab, 1400, mode)
+        for selector, how in [*marks, (".held", "stroke")]:
+            assert contrast(colour(tab.locator(selector).first, how), ground) >= 3, selector
+        share = float(slider.evaluate("(node) => getComputedStyle(node).opacity"))
+        mixed = slider.evaluate(
+            """(node, [share, ground]) => {
+              const own = getComputedStyle(node).accentColor;
+              node.style.outlineColor = `color-mix(in srgb, ${own} ${100 * share}%, ${ground})`;
+              return getComputedStyle(node).outlineColor;
+            }""",
+            [share, ground],
+        )
+        assert contrast(code(mixed), ground) >= 3
+
+
+@pytest.mark.parametrize("name", ["problem", "patterns"])
+def test_the_link_below_a_small_one_is_large_enough(visit, name):
+    for touch, least in ((False, 24), (True, 44)):
+        tab = visit(chapter=name, width=390, has_touch=touch, is_mobile=touch)
+        assert tab.locator(".more a").first.bounding_box()["height"] >= least
 
 
 @pytest.mark.parametrize("name", ["explorer", "intro", "three_balls", "compliance"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from chains import magnitudes, uniform
+from explorer import EXPLORER
 from script import Script
 
 from cradle import Chain, SpringChain, collide, spring_velocities
@@ -125,3 +126,12 @@ def test_a_reader_chooses_spheres(still):
     lossy.drawn()
     assert "choose a restitution of 0.02" in lossy.inner_text(".words")
     assert lossy.state("setting")["restitution"] == [0.01, 0.01]
+    lossy.go_to("speeds=1,0,0&masses=0.014,98,58.9&restitution=0.87,0.28&law=spheres")
+    far = lossy.drawn()
+    assert lossy.locator(".balance").is_hidden()  # names of nothing
+    assert "larger restitutions, or masses nearer" in lossy.inner_text(".words")
+    for remedy in ({"restitution": [0.87, 0.5]}, {"masses": [0.05, 30, 20]}):  # both help
+        lossy.evaluate(
+            f"(setting) => {EXPLORER}.state.set(setting)", far | remedy | {"law": "spheres"}
+        )
+        assert lossy.drawn()["after"]

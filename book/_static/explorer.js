@@ -113,9 +113,11 @@
       explorer.data.palette.forEach((own, ball, palette) => {
         const kind = "kinds" in this.host.dataset ? "ABCD".indexOf(letters[ball] ?? "-") : -1;
         const colour = palette[kind] ?? own;
-        // Black lines take the colour of the text, as in all figures of the book.
-        const shown = colour === "#000000" ? "var(--pst-color-text-base, #000)" : colour;
-        this.host.style.setProperty(`--ball-${ball}`, shown);
+        // Black lines take the colour of the text, as in all figures of the book, and pale ones a
+        // part of it: a mark on white needs a luminance of at most 0.3.
+        const pale = explorer.luminance(colour) > 0.3;
+        const shown = pale ? `color-mix(in srgb, ${colour} 80%, var(--ink))` : colour;
+        this.host.style.setProperty(`--ball-${ball}`, colour === "#000000" ? "var(--ink)" : shown);
       });
     }
 

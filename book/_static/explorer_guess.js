@@ -96,10 +96,11 @@
       list.show(guess?.answer ?? null);
       if (guess?.open && number > 0) return; // the question is that of the first hit
       const right = open && guess && ANSWERS[answer]({ hit, record, now });
-      if (!right) told.textContent = "";
-      else if (!guess.answer) told.textContent = `Answer: ${right}.`;
-      else if (right === guess.answer) told.textContent = `Yes: ${right}.`;
-      else told.textContent = `You said ${guess.answer}; it is ${right}.`;
+      let words = "";
+      if (right && !guess.answer) words = `Answer: ${right}.`;
+      else if (right && right === guess.answer) words = `Yes: ${right}.`;
+      else if (right) words = `You said ${guess.answer}; it is ${right}.`;
+      if (told.textContent !== words) told.textContent = words; // it is heard once
     }
     return { node, after, show };
   }

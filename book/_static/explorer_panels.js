@@ -75,7 +75,8 @@
       if (play.textContent !== words) play.textContent = words;
       const name = again ? "Guess again" : "Pull back";
       if (back.textContent !== name) back.textContent = name;
-      back.disabled = clock.time <= 0 && !clock.playing && !again;
+      // It keeps the focus of who has pressed it.
+      back.setAttribute("aria-disabled", clock.time <= 0 && !clock.playing && !again);
       slow.setAttribute("aria-pressed", clock.slow);
       [guessing === "always", Boolean(loud)].forEach((on, k) => more[k]?.setAttribute("aria-pressed", on));
     }
@@ -290,6 +291,7 @@
       const drawn = covered ? { span: explorer.guessReach(setting).span, gap: 1.1 } : ghost;
       // The numbers of a guess stand where the outlines of the velocities before would be.
       const before = covered ? hit.before.map(() => 0) : hit.before;
+      balance.hidden = !now;
       bars.innerHTML = now ? explorer.bars(box(bars), setting, before, now, drawn) : "";
       momentum.innerHTML = now ? explorer.momentum(box(momentum), setting, hit.before, now) : "";
       const inside = !covered && record && part < 1;

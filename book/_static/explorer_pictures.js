@@ -47,10 +47,11 @@
     }
     function show({ setting, record, part }) {
       if (record !== listed) list(setting, record); // each frame comes here
-      [...node.children].forEach(({ firstChild }, k) => {
-        const now = part >= events[k].at - 1e-9 && !(part >= (events[k + 1]?.at ?? 2) - 1e-9);
-        firstChild.setAttribute("aria-pressed", now);
-      });
+      // The last ones that have come: several may share an instant.
+      const last = events.filter(({ at }) => at <= part + 1e-9).at(-1)?.at;
+      [...node.children].forEach(({ firstChild }, k) =>
+        firstChild.setAttribute("aria-pressed", Math.abs(events[k].at - last) < 1e-9),
+      );
     }
     return { node, show };
   }

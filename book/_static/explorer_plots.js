@@ -17,15 +17,19 @@
   const percent = (share) => `${fixed(100 * share, 0)}\u00a0%`;
   const colour = (ball) => `var(--ball-${ball})`;
 
-  // Letters on a ball's colour: black or white, whichever has more contrast (WCAG 2: relative
-  // luminance). A black ball has the colour of the text.
+  // WCAG 2: relative luminance.
+  function luminance(code) {
+    const parts = [1, 3, 5].map((k) => parseInt(code.slice(k, k + 2), 16) / 255);
+    const linear = parts.map((p) => (p <= 0.04045 ? p / 12.92 : ((p + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+  }
+
+  // Letters on a ball's colour: black or white, whichever has more contrast. A black ball has the
+  // colour of the text.
   function letters(ball) {
     const code = explorer.data.palette[ball];
     if (code === "#000000") return "var(--ground)";
-    const parts = [1, 3, 5].map((k) => parseInt(code.slice(k, k + 2), 16) / 255);
-    const linear = parts.map((p) => (p <= 0.04045 ? p / 12.92 : ((p + 0.055) / 1.055) ** 2.4));
-    const luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
-    return (luminance + 0.05) ** 2 > 0.05 * 1.05 ? "#000" : "#fff";
+    return (luminance(code) + 0.05) ** 2 > 0.05 * 1.05 ? "#000" : "#fff";
   }
 
   function stroke(ball, width = 2.2) {
@@ -422,6 +426,7 @@
     dots,
     during,
     energy,
+    luminance,
     momentum,
     names,
     partBy,

@@ -202,11 +202,12 @@
 
   // Read a fragment: {setting, picture}, or {error} in words. A key may be left out.
   function fromFragment(text) {
-    const given = new Map(text.split("&").map((part) => part.split("=", 2)));
+    const parts = text.split("&").filter((part) => part !== "");
+    const given = new Map(parts.map((part) => part.split("=", 2)));
     const unknown = [...given.keys()].find(
       (key) => !(Object.hasOwn(LENGTHS, key) || ["letters", "picture", "law", "gap", "stiffness"].includes(key)),
     );
-    if (unknown !== undefined) return { error: `${unknown} is no part of a setting` };
+    if (unknown !== undefined) return { error: `${unknown || "a value without a name"} is no part of a setting` };
     const numbers = (name) =>
       given
         .get(name)

@@ -38,7 +38,7 @@
   function tasksPanel() {
     const met = TASKS.map(() => false);
     const items = TASKS.map(([stars, words]) =>
-      make("li", {}, make("span", { "aria-label": `grade ${stars} of 3` }, "★".repeat(stars)), ` ${words} `, make("b", {})),
+      make("li", {}, make("span", { role: "img", "aria-label": `grade ${stars} of 3` }, "★".repeat(stars)), ` ${words} `, make("b", {})),
     );
     const count = make("span", { role: "status" });
     const node = make(

@@ -57,8 +57,10 @@
   }
 
   function noAnswer(status, setting) {
-    if (status === "lossy")
+    if (status === "lossy" && setting.restitution.some((e) => e < 0.02))
       return "Spheres that lose so much are not followed here: choose a restitution of 0.02 or more.";
+    if (status === "lossy")
+      return "Spheres that differ so much and lose so much are not followed here: choose larger restitutions, or masses nearer to each other.";
     const many =
       explorer.law(setting) === "rule"
         ? `This hit takes more than ${explorer.EVENTS} events, more`

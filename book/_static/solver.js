@@ -83,7 +83,7 @@
     const start = make("button", { type: "button", class: "main", onclick: () => run() }, "Run");
     const halt = make("button", { type: "button", onclick: () => worker && stop("Stopped.") }, "Stop");
     const told = make("span", { class: "told", role: "status" });
-    const printed = make("pre", { class: "printed", role: "region", tabindex: 0, "aria-label": "what your lines print" });
+    const printed = make("pre", { class: "printed", role: "region", "aria-label": "what your lines print" });
     const wrong = make("pre", { class: "wrong", role: "alert" });
     // First single calls of the reader's function, then whole impacts.
     const first = calls[piece] ?? [];
@@ -140,6 +140,7 @@
     }
     function hear(code, { printed: text, number: check, found, broken, error, line, done }) {
       if (text) printed.textContent += text;
+      printed.tabIndex = 0; // it scrolls; the theme takes no key to what was empty
       if (found) show(check, found);
       if (broken) results[check].textContent = "an error: no answer";
       const empty = line && error?.includes("NotImplementedError");
