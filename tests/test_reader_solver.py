@@ -367,6 +367,8 @@ def test_what_was_written_is_there_after_a_way_back(visit):
     editor = Editor(tab, piece_of("rates"))
     editor.area.fill("mine")
     tab.wait_for_function("history.state?.rates === 'mine'")
+    tab.evaluate("location.hash = 'own-solver'")  # a link to a place in the page
+    tab.wait_for_function("history.state?.rates === 'mine'")
     tab.locator("a.right-next").first.click()
     tab.wait_for_function("!document.querySelector('.reader-solver')")
     tab.go_back()

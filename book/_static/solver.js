@@ -21,6 +21,13 @@
     return node;
   }
 
+  // Whoever comes back to the page, or loads it again, finds what was written, by the piece; also
+  // after a link to a place in it.
+  const kept = { ...history.state };
+  let keeping = 0;
+  const keep = () => history.replaceState({ ...history.state, ...kept }, "");
+  addEventListener("hashchange", keep);
+
   let loading = null;
   const python = () =>
     (loading ??= new Promise((done, refuse) => {
@@ -44,7 +51,6 @@
     let worker = null;
     let running = false; // or Python is being loaded for it
     let timers = [];
-    let saving = 0;
 
     // --- the editor -----------------------------------------------------------------------------
     const count = make("pre", { class: "count", "aria-hidden": true });
@@ -56,8 +62,9 @@
       "aria-label": `your ${piece || "solver"}, in Python`,
       oninput: () => {
         number();
-        clearTimeout(saving);
-        saving = setTimeout(keep, KEEP);
+        kept[piece] = editor.value;
+        clearTimeout(keeping);
+        keeping = setTimeout(keep, KEEP);
       },
       onkeydown: (event) => key(event),
     });
@@ -66,8 +73,6 @@
       editor.rows = rows;
       count.textContent = Array.from({ length: rows }, (_, k) => k + 1).join("\n");
     }
-    // Whoever comes back to the page, or loads it again, finds what was written.
-    const keep = () => history.replaceState({ ...history.state, [piece]: editor.value }, "");
     function key(event) {
       if (event.key !== "Enter" || event.isComposing) return;
       if (event.ctrlKey || event.metaKey) run();
@@ -206,7 +211,7 @@
     );
     host.classList.add("live");
     may(true, false);
-    editor.value = history.state?.[piece] ?? own;
+    editor.value = kept[piece] ?? own;
     number();
   }
 
