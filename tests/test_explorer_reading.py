@@ -440,6 +440,21 @@ def test_fits_and_can_be_read(still, width: int):
         assert contrast(colour(main, "color"), colour(main, "backgroundColor")) > 7
 
 
+def test_letters_twice_as_large_fit(still):
+    """What stands side by side comes one below the other."""
+    tab = still(width=640)
+    tab.add_style_tag(content="html { font-size: 200% !important }")
+    tab.evaluate(f"{EXPLORER}.changed()")
+    tab.drawn()
+    beyond = tab.evaluate(
+        """[...document.querySelectorAll(".cradle-explorer *")].filter((node) =>
+          node.checkVisibility() && !node.closest(".unseen")
+          && node.getBoundingClientRect().right > innerWidth + 1)
+          .map((node) => node.outerHTML.slice(0, 60))"""
+    )
+    assert beyond == []
+
+
 def test_marks_can_be_seen(still):
     """Balls, also pale ones, the zone of ratios above their bound, sliders of several values."""
     tab = still("#speeds=1,0,0,0,0,0,0&masses=1,2,1,1,1,1,1&forward=0.9&picture=sweep")
