@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from chains import striking
+from chains import magnitudes, striking
 from energy_law import strike
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -154,3 +154,16 @@ def test_a_contact_that_opens_and_closes_within_one_step_is_seen():
     models = (EnergyDistribution([0.125, 0.5, 4], 1, rtol=rtol) for rtol in (1e-8, 1e-11))
     coarse, fine = (collide(chain, model) for model in models)
     np.testing.assert_allclose(coarse.velocities, fine.velocities, rtol=0, atol=1e-13)
+
+
+def test_curves_have_the_largest_closing_speeds():
+    """Speeds have maxima within steps: a law e(u) asks for them.  Springs take short steps."""
+    rng = np.random.default_rng(3)
+    for n in [3, 4, 5, 6] * 3:
+        k, p = magnitudes(rng, 1, n - 1), float(rng.uniform(1, 2))
+        chain = Chain(magnitudes(rng, 1, n), np.eye(n)[0], 1)
+        _, v = collide(chain, EnergyDistribution(k, p)).curve()
+        exact = collide(chain, SpringChain(k, p)).step_velocities
+        np.testing.assert_allclose(
+            np.diff(v).min(axis=0), np.diff(exact).min(axis=0), rtol=0, atol=1e-4
+        )

@@ -258,8 +258,7 @@ def hertz_stiffness(radii: ArrayLike, young: float = 210e9, poisson: float = 0.3
     if r.ndim == 0 or r.shape[-1] < 2:
         raise ValueError(f"radii has shape {r.shape}; must be (..., N), of two balls or more")
     e = asked.one_number("young", young, *asked.ABOVE_ZERO)
-    rule = "must be above -1 and at most 0.5"
-    nu = asked.one_number("poisson", poisson, rule, -1.0, 0.5, open_low=True)
+    nu = asked.one_number("poisson", poisson, "must be above -1 and at most 0.5", -1.0, 0.5, True)
     half = r[..., :-1] / (r[..., :-1] + r[..., 1:]) * r[..., 1:]
     return np.asarray(2.0 / 3.0 * e / (1.0 - nu * nu) * np.sqrt(half))
 

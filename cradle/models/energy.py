@@ -18,14 +18,14 @@ BEYOND = "its reduced mass with masses{} = {!r} is beyond the range of floats: c
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class EnergyTrace(Trace):
-    """The trace of an impact by `EnergyDistribution`, with its curves at S steps."""
+    """The trace of an impact by `EnergyDistribution`, with its curves at S points."""
 
-    step_velocities: Vector  #: Velocities at each step of the integration, shape (S, N), m/s.
-    step_impulses: Vector  #: Impulses so far at each step, shape (S, N - 1), N s.
+    step_velocities: Vector  #: At steps, and where contacts close fastest, shape (S, N), m/s.
+    step_impulses: Vector  #: Impulses so far at these points, shape (S, N - 1), N s.
     evaluations: int  #: How often the proportions of the impulses were evaluated.
 
     def curve(self) -> tuple[Vector, Vector]:
-        """Return impulses and velocities at the steps of the integration, and at the end."""
+        """Return impulses and velocities at the points of the curves, and at the end."""
         impulses = np.vstack([self.step_impulses, self.impulses])
         return impulses, np.vstack([self.step_velocities, self.velocities])
 
@@ -196,7 +196,8 @@ class _Process:
         moving = (self.depths(self.y) != 0.0) | (self.speeds(self.y) != 0.0)
         contacts = np.flatnonzero(self.closed | moving).tolist()
         crossings, extremes = zip(*map(self.watched, contacts), strict=True)
-        options = {"rtol": self.rtol, "atol": self.atol, "events": crossings + extremes}
+        options = {"rtol": self.rtol, "atol": self.atol, "dense_output": True}
+        options["events"] = crossings + extremes
         side, end = np.where(self.closed, 1.0, -1.0), np.inf
         # A contact that opens and closes again (or the reverse) within one step goes unnoticed,
         # but for its extreme: a second run that ends there has to cross zero before.
@@ -215,7 +216,11 @@ class _Process:
             end = min(missed)
         if found.status < 0:
             raise _Stopped(found.message)
-        self.steps.append(found.y)
+        k = 16 * np.arange(len(found.t))
+        fine = found.sol(np.interp(np.arange(k[-1] + 1), k, found.t))
+        u = self.u[:, None] - np.diff(self.parts(fine)[0], axis=0)
+        faster = u.max(axis=1) > u[:, k].max(axis=1) + self.rtol
+        self.steps.append(fine[:, np.union1d(k, u.argmax(axis=1)[faster])])
         self.t, self.y = float(found.t[-1]), found.y[:, -1].copy()
         self.turn([c for k, c in enumerate(contacts) if len(times[half + k])])
         self.settle([c for k, c in enumerate(contacts) if len(times[k])])
