@@ -168,12 +168,13 @@ class _Run:
         for first, last in groups:  # to where they touch but for rounding; their centre stays
             offset = hanging.offsets(first, last)
             self.x[first:last] = mean(x[first:last] + offset, hanging.masses[first:last]) - offset
-        duration, way, kicked = self.collide(groups, v)
-        if duration:  # of contact forces: what strings pull is half a kick before, half after
-            self.instants.append((self.t, x, x, v, v, v, duration))
-            self.instants.append((self.t, x, self.x, kicked, self.v, self.v, duration))
+        duration, way, kicked, early = self.collide(groups, v)
+        if duration:  # of contact forces: what strings pull is a kick before, the rest after
+            most = max(duration, 2.0 * early)
+            self.instants.append((self.t, x, x, v, v, v, most))
+            self.instants.append((self.t, x, self.x, kicked, self.v, self.v, most))
             x = hanging.apart(self.x + way)  # but for what is left of a compression, far too little
-            v = self.v = self.v + 0.5 * duration * hanging.accelerations(x, self.v)
+            v = self.v = self.v + (duration - early) * hanging.accelerations(x, self.v)
             self.t, self.x = self.t + duration, x
             touching = (self.gaps() == 0.0) & (v[1:] - v[:-1] >= -RESTING * self.speed)
         struck = self.v
@@ -193,18 +194,18 @@ class _Run:
         gaps = self.hanging.gaps + (self.x[1:] - self.x[:-1])
         return np.where(gaps > NEAR * self.size, gaps, 0.0)
 
-    def collide(self, groups: Sequence[Any], before: Vector) -> tuple[float, Vector, Vector]:
-        """Solve the impacts of this instant as one; return how long, how far, and from which v."""
+    def collide(self, groups: Sequence[Any], before: Vector) -> tuple[float, Vector, Vector, float]:
+        """Solve impacts of an instant as one; return how long, how far, from which v, the kick."""
         closing = before[:-1] - before[1:] > RESTING * self.speed
-        duration, way = 0.0, 0.0 * before
+        duration, early, way = 0.0, 0.0, 0.0 * before
         struck = [(first, last) for first, last in groups if closing[first : last - 1].any()]
         if not struck:
-            return duration, way, before
-        if self.lasting:  # the first half of the kick must know how long it takes
+            return duration, way, before, early
+        if self.lasting:  # about half, as the kick itself may decide whether more balls meet
             (first, last), _, duration, _ = self.followed(*struck[0], before)
-            self.lasting = duration * self.hanging.fastest < LONGEST
+            early, self.lasting = 0.5 * duration, duration * self.hanging.fastest < LONGEST
         if self.lasting:
-            before = before + 0.5 * duration * self.hanging.accelerations(self.x, before)
+            before = before + early * self.hanging.accelerations(self.x, before)
             balls, trace, duration, way = self.followed(first, last, before)
             self.v = before.copy()
             struck, traces = [balls], [trace]
@@ -215,7 +216,7 @@ class _Run:
         contacts = tuple(c for first, last in struck for c in range(first, last - 1))
         loss = sum(trace.energy_loss for trace in traces)
         self.impacts.append(Impact(self.t, contacts, self.x, before, self.v, loss, tuple(traces)))
-        return duration, way, before
+        return duration, way, before, early
 
     def followed(self, first: int, last: int, before: Vector) -> tuple[Any, Any, float, Vector]:
         """Follow contact forces, of these balls and all that they meet, until contacts are open."""
