@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from chains import magnitudes, striking
+from chains import magnitudes, striking, uniform
 from energy_law import strike
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -160,7 +160,7 @@ def test_curves_have_the_largest_closing_speeds():
     """Speeds have maxima within steps: a law e(u) asks for them.  Springs take short steps."""
     rng = np.random.default_rng(3)
     for n in [3, 4, 5, 6] * 3:
-        k, p = magnitudes(rng, 1, n - 1), float(rng.uniform(1, 2))
+        k, p = magnitudes(rng, 1, n - 1), float(uniform(rng, 1, 2))
         chain = Chain(magnitudes(rng, 1, n), np.eye(n)[0], 1)
         _, v = collide(chain, EnergyDistribution(k, p)).curve()
         exact = collide(chain, SpringChain(k, p)).step_velocities
