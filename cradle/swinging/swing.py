@@ -58,11 +58,11 @@ def swing(
     TypeError, ImpactNotFinished, ImpactNotCertified
         As `collide`.
     ValueError
-        If a value is wrong, balls overlap, a ball at small angles swings farther aside than it may
-        be released, or the model cannot treat an impact.
+        If a value is wrong, balls overlap, a ball swings farther aside than it may be released, or
+        the model cannot treat an impact.
     RuntimeError
         If contacts open and close without end at one instant; or if the check of the whole run
-        fails: balls pass each other or go over the top, energy or momentum is not kept.
+        fails: balls pass each other, energy or momentum is not kept.
 
     Examples
     --------
@@ -133,10 +133,8 @@ class _Run:
         while len(self.impacts) < most:
             flight = kind(hanging, self.x, self.v, self.together, self.parting)
             wait, closing, opening = flight.next_meeting(left := max(end - self.t, 0.0))
-            # Others are certified not to go over the top.
-            if isinstance(flight, SmallAngleFlight) and flight.may_leave(hanging.reach):
-                far = (1.0 - INSTANT) * flight.turning(min(wait, left))
-                hanging.within_reach(far, f"after t = {self.t:.4g} s ")
+            far = (1.0 - INSTANT) * flight.turning(min(wait, left))
+            hanging.within_reach(far, f"after t = {self.t:.4g} s ")
             later = self.t + wait
             here = int(times.searchsorted(later, side="left"))
             if here > done or later > end:
@@ -287,11 +285,9 @@ def certify(run: _Run, times: Vector, seen_x: Vector, seen_v: Vector) -> None:
     most += lasts[begun] * hanging.fastest * kept[begun]  # of a strike: strings are kicks
     least = -math.inf if hanging.damping.any() else -most
     overlap = (x[:, :-1] - x[:, 1:] - hanging.gaps).max(axis=-1)
-    top, far = math.inf if hanging.small else hanging.reach[0], np.abs(x).max(axis=-1)
     for what, at, value, low, high in (
         ("impacts have made or lost {:g} kg m/s", instants, (left - v) @ m, -push, push),
         ("{:g} J are made or lost beside the impacts", instants, kept - before, -work, work),
-        ("a ball that swung too far is {:g} m along its circle", until, far, 0.0, top),
         ("balls overlap by {:g} m", until, overlap, -math.inf, TIE * run.size),
         ("a flight has made or lost {:g} J", until, gain, least, most),
     ):
