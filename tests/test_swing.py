@@ -314,6 +314,26 @@ def test_elastic_balls_keep_their_energy_for_a_minute(stiffness):
     assert run.lasting is (stiffness == 1e10)
 
 
+@pytest.mark.parametrize(
+    ("damping", "taken", "most"),
+    [("viscoelastic", 0.015, "0.0166 s"), ("hunt-crossley", 40, "50.5")],
+)
+def test_viscosities_suit_the_speeds_that_occur(damping, taken, most):
+    """Not 1 m/s, a bound a quarter lower, or fivefold: no ball closes yet, then they are slower."""
+    law = partial(SpringChain, 1e7, damping=damping, accuracy=1e-4)
+    assert (collide(Chain([1, 1], [0, 0]), law(viscosity=1e9)).velocities == 0).all()
+    start = pulled(3), [0, 0.3]
+    before, after = swing(balls(3), law(viscosity=taken), *start).energy
+    assert 1 / 3 < after / before < 0.4
+    with pytest.raises(
+        ValueError, match=rf"viscosity\[0\] = .*; must be at most {most}"
+    ) as refused:
+        swing(balls(3), law(viscosity=1.5 * taken), *start)
+    assert refused.value.__notes__ == [
+        f"at the impact at t = {0.15859349623048533} s, balls 0 to 2"
+    ]
+
+
 def test_a_strike_that_lasts_long_is_taken_for_none():
     """Of many lossy balls; strings that pull as long are no kick, and made energy in the end."""
     chain, law = Chain([0.045] * 20, [0] * 20), SpringChain(1e8, viscosity=6e-6, accuracy=1e-4)

@@ -85,6 +85,7 @@ def measure(n, chain, law, sized, s, clock):
         return
     widest = min(WIDEST, BLURRED * law.accuracy)
     rate = clock.speed if law.hunt else clock.speed / clock.length
+    rate = rate if fast > 0.0 else 0.0  # else nothing is lost, at whatever speed
     longest = MOST_HUNT if law.hunt else LONGEST
     total = mean = 0.0
     clock.lossy = clock.leans = 0.0
