@@ -480,6 +480,20 @@ def test_contacts_that_open_and_close_at_a_turning_point(part):
     assert run.ended == "times"
 
 
+@pytest.mark.parametrize(
+    ("k", "length", "e"),
+    [
+        (1, [0.1000002, 0.1000005, 0.1000003, 0.1, 0.1000008], 0.2),
+        (3, [0.1000002, 0.1, 0.1000008, 0.1], 0),
+    ],
+)
+def test_strings_that_differ_by_less_than_a_micrometre(k, length, e):
+    """Where no force is left to speak of, a contact that pulls was held beside one that pushes."""
+    n = len(length)
+    run = swing(balls(n, e), SequentialCollisions(), pulled(n, k), [3], pendulums=Pendulums(length))
+    assert run.ended == "times"
+
+
 def test_balls_that_swing_alike_touch_all_the_time():
     """Balls 1 and 2 never part, so ball 3 strikes both: in one run, and handed over in two."""
     hanging, model = Pendulums(0.1, damping=[0, 0, 0.5]), ImpulseCorrelation(0.3)

@@ -46,9 +46,7 @@ def common_velocities(
             v[body] = mean(v[body], masses[body])
 
 
-def pressed(
-    masses: Vector, accelerations: Vector, resting: NDArray[np.bool_], least: float
-) -> NDArray[np.bool_]:
+def pressed(masses: Vector, accelerations: Vector, resting: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the resting contacts whose balls, left alone, would not separate (rule 3)."""
     # Of all accelerations without passing, contacts that push and do not pull give those nearest to
     # the balls left alone, in the mean square by mass (Gauss's principle of least constraint).  For
@@ -58,5 +56,5 @@ def pressed(
     kept = np.zeros(len(resting), dtype=bool)
     for first, last in stretches(resting):
         nearest = isotonic_regression(accelerations[first:last], weights=masses[first:last]).x
-        kept[first : last - 1] = np.diff(nearest) <= least
+        kept[first : last - 1] = np.diff(nearest) <= 0.0
     return kept

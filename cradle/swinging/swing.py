@@ -183,7 +183,7 @@ class _Run:
         self.instants.append((self.t, x, self.x, v, struck, self.v, 0.0))
         if np.count_nonzero(resting):
             alone = hanging.accelerations(self.x, self.v)
-            resting = pressed(hanging.masses, alone, resting, 1e-12 * self.speed * hanging.fastest)
+            resting = pressed(hanging.masses, alone, resting)
         self.together = tuple(resting.tolist())
         self.parting = tuple((touching & ~resting).tolist())
 
