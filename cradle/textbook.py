@@ -230,7 +230,7 @@ def solve(
     masses: Any, velocities: Any, restitution: Any, forward: Any, backward: Any = None, *,
     meeting: Any = 0.5, number: Any = float, max_events: int = 100_000, impact: Any = Impact,
 ) -> Impact:  # fmt: skip
-    """Return an impact after R1 to R8; arguments as for `Chain` and `ImpulseCorrelation`.
+    """Return an impact after R1 to R8; arguments, unchecked, as for `Chain`, `ImpulseCorrelation`.
 
     Examples
     --------

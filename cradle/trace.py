@@ -149,7 +149,7 @@ class Trace:
 
 
 class ImpactNotFinished(RuntimeError):
-    """An impact was still going on after the largest number of steps that its model allows.
+    """The end of an impact was not reached: its model allows no more steps, or runs do not agree.
 
     Its `trace` holds what was reached.  Its `stored` is the work that contacts can still give back,
     in units of the heaviest mass times the square of the largest speed before the impact; or it is

@@ -31,7 +31,7 @@ class SpeedDependent:
     Parameters
     ----------
     model : Model
-        The impact law, such as `SequentialCollisions`.
+        A law that leaves e to the chain: not `SpringChain`, and not `QuadraticDissipation`.
     restitution : callable
         Takes u above 0, returns e in [0, 1]: `ConstantLoss`, `ViscousLoss` or your own function.
 

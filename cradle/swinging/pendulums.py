@@ -19,7 +19,7 @@ class Pendulums:
 
     Parameters
     ----------
-    length, gravity : float or (length) array_like of shape (N,)
+    length, gravity : float; length also array_like of shape (N,)
         From each pivot to the centre of its ball, m; and g, m/s^2.  Both above 0.
     gaps : float or array_like of shape (N - 1,)
         Between the surfaces of neighbours at rest, m; 0 if they just touch.
