@@ -31,10 +31,10 @@ def data_folder() -> "Traversable":
 
 
 @cache
-def table_rows(name: str) -> tuple[dict[str, str], ...]:
-    """Return the rows of a data file, such as "benchmarks.csv", as texts by column."""
+def table_rows(name: str) -> tuple[Mapping[str, str], ...]:
+    """Return the rows of a data file, such as "benchmarks.csv", as texts by column; read-only."""
     with (data_folder() / name).open(encoding="utf-8") as file:
-        return tuple(csv.DictReader(file))
+        return tuple(map(MappingProxyType, csv.DictReader(file)))
 
 
 @cache
@@ -119,8 +119,7 @@ def paper_chain(
     Parameters
     ----------
     sequence : str or iterable of str
-        Ball types, first ball first: at least two letters out of "A" to "D"; other values raise a
-        `ValueError` or a `TypeError`.
+        Ball types, first ball first: two letters or more, A to D; else a ValueError or TypeError.
     speed, excess, meeting
         Velocity of the first ball, m/s; the other two are as for `ImpulseCorrelation`.
 

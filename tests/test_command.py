@@ -322,6 +322,13 @@ def test_a_long_swing_is_told_of(monkeypatch, ended):
         assert ("swings take a while" in ended(f"swing 3 --seconds {seconds}").err) == told
 
 
+def test_a_swing_that_fails_ends_in_one_line(monkeypatch, ended):
+    """Also where it is the solver that fails, not the input."""
+    stop = RuntimeError("the swing does not get beyond t = 1 s")
+    monkeypatch.setattr("cradle.swing", lambda *_, **__: (_ for _ in ()).throw(stop))
+    assert ended("swing 3", 1).err == "cradle: the swing does not get beyond t = 1 s\n"
+
+
 def test_a_long_row_of_springs_needs_no_way(monkeypatch):
     """Its collisions are counted on the way, which would fill the memory."""
     monkeypatch.setattr(TimedTrace, "_way", lambda *_: pytest.fail("the way was followed"))

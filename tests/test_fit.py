@@ -26,6 +26,7 @@ from cradle.fit import (
     Fit,
     Shots,
     estimate,
+    frames,
     ratio,
     read_shots,
     read_tracker,
@@ -776,6 +777,21 @@ def test_tracks_may_be_lists_and_are_asked():
     ):
         with pytest.raises(ValueError, match=f"^{message}"):
             velocities_from_tracks(lists | {"A": Track(lists["A"].times, wrong)}, length=0.3)
+        with pytest.raises(ValueError, match=f"^{message}"):
+            frames(lists | {"A": Track(lists["A"].times, wrong)})
+    turned = {name: Track(*np.flip(ball, axis=1)) for name, ball in tracks.items()}
+    with pytest.raises(ValueError, match=r"^times of B\[1\] = 0\.\d+; must rise"):
+        velocities_from_tracks(turned, length=0.3)
+    for call in (velocities_from_tracks, frames):
+        with pytest.raises(TypeError, match=r"^tracks is a list; must be"):
+            call(list(tracks.values()))
+
+
+def test_tracks_and_velocities_can_be_compared():
+    """As objects: arrays have no one truth."""
+    one, other = (read_tracker(DATA / "video_synthetic.txt")["A"] for _ in range(2))
+    assert one == one != other
+    assert len({one, other}) == 2
 
 
 def test_correlations_are_those_of_the_ellipse():

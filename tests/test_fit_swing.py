@@ -304,6 +304,12 @@ def test_refused(changes, words):
         fit_swing(**given)
 
 
+@pytest.mark.parametrize(("name", "what"), [("free", "a Collection"), ("known", "a Mapping")])
+def test_refused_by_type(name, what):
+    with pytest.raises(TypeError, match=f"^{name} is a float; must be {what}$"):
+        fit_swing(WAYS, PLACES, LAW, **{name: 0.9})
+
+
 def test_a_film_as_a_tracker_exports_it(tmp_path):
     """Two unlike balls, in mm and slowed, two marks missing: what was given comes back."""
     times, hanging = np.arange(0, 3, 1 / 50), Pendulums(9.81 * (0.45 / np.pi) ** 2, gaps=1e-4)

@@ -55,6 +55,8 @@ def test_masses_are_in_kilograms_and_stay():
     assert dict(ball_masses()) == {"A": 0.045, "B": 0.053, "C": 0.053, "D": 0.166}
     with pytest.raises(TypeError):
         ball_masses()["A"] = 1.0
+    with pytest.raises(TypeError):  # they are kept for the next call
+        tables.table_rows("masses.csv")[0]["mass_kg"] = "1"
 
 
 def test_paper_chain_by_hand():

@@ -9,7 +9,7 @@ import numpy as np
 
 from cradle.advice.measured import LAWS, evidence, measured_chain, rows
 from cradle.chain import Chain
-from cradle.input.values import ArrayLike, must_be, one_number, one_of, whole_number
+from cradle.input.values import PART, ArrayLike, must_be, one_number, one_of, whole_number
 from cradle.models import Model
 from cradle.models.compliant import SpringChain
 from cradle.models.correlation import ImpulseCorrelation
@@ -145,8 +145,7 @@ def recommend(
     """
     must_be(Chain, "chain", chain)
     one_number("accuracy", accuracy, "must lie in [1e-15, 1]", 1e-15, 1.0)
-    if model_error is not None:
-        one_number("model_error", model_error, "must lie in [0, 1]", 0.0, 1.0)
+    one_number("model_error", 0.0 if model_error is None else model_error, *PART)
     whole_number("impacts", impacts)
     if ratios is not None and not isinstance(ratios, ImpulseCorrelation):
         ratios = ImpulseCorrelation(ratios)

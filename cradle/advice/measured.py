@@ -51,7 +51,7 @@ def rows(group: str) -> tuple[Measured, ...]:
     for line in lines:
         if line["model"] == "two balls" and line["setting"].startswith("all: "):
             # A batch of two balls, by `post_impact_velocities`.
-            line = line | {"group": "event", "model": LAWS["event"], "setting": "compiled, batch"}
+            line = {**line, "group": "event", "model": LAWS["event"], "setting": "compiled, batch"}
         there = group != "event" or line["setting"] in calls
         if (line["group"], line["model"]) == (group, LAWS[group]) and there:
             error = line["numerical_error"]

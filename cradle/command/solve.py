@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 import cradle
-from cradle import ImpactNotCertified, ImpactNotFinished, collide
+from cradle import collide
 from cradle.advice.choice import made
 from cradle.command.console import format_options, plotted, save, show
 from cradle.command.describe import chain_options, described, one_or_all
@@ -183,7 +183,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit; wrong input ends in one line on standard error."""
     try:
         main(arguments, prog_name="cradle")
-    except (ValueError, OSError, ImportError, ImpactNotFinished, ImpactNotCertified) as error:
+    except (ValueError, OSError, ImportError, RuntimeError) as error:
         message = str(error)
         for python, option in _OPTIONS.items():
             message = re.sub(python, option, message)

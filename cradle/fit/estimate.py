@@ -80,7 +80,7 @@ def ratio(
     from tqdm import tqdm
 
     given, fixed, masses = _restitution_values(restitution, sets), dict[Key, float](), shots.masses
-    for triplet, value in must_be(Mapping, "known", known or {}).items():
+    for triplet, value in must_be(Mapping, "known", {} if known is None else known).items():
         key, name = parameter_key(triplet), f"known[{triplet!r}]"
         if len(key) != 3 or not masses.keys() >= set(key):
             raise ValueError(f"{name}; must name three of the balls {', '.join(masses)}")

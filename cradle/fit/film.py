@@ -8,7 +8,8 @@ import numpy as np
 import scipy
 
 from cradle.fit.tracks import Track
-from cradle.input.values import ABOVE_ZERO, Vector, checked, one_number, whole_number
+from cradle.input import values as asked
+from cradle.input.values import ABOVE_ZERO, Vector, checked, must_be, one_number, whole_number
 from cradle.trace import compared_as_objects
 
 _GRAVITY = 9.81
@@ -42,8 +43,8 @@ def velocities_from_tracks(
     First the moment is fitted at which all tracks bend, then the velocity of each ball by itself on
     either side of it, so that the errors are independent.  Before the impact all balls that do not
     strike must rest.  A mark farther off than chance allows is named in a warning.  Fewer than two
-    balls, too few marks on either side, and marks that do not lie on such a motion raise a
-    ValueError (of right films, one in a hundred thousand is refused).
+    balls, times that do not rise, too few marks on either side, and marks that do not lie on such a
+    motion raise a ValueError (of right films, one in a hundred thousand is refused).
 
     Parameters
     ----------
@@ -66,7 +67,8 @@ def velocities_from_tracks(
     >>> velocities_from_tracks(tracks, length=0.3, window=0.05).sigma.round(3).tolist()
     [0.009, 0.009, 0.009]
     """
-    tracks = {name: Track(*checked(f"tracks[{name!r}]", ball)) for name, ball in tracks.items()}
+    tracks = {name: Track(*checked(f"tracks[{name!r}]", ball))
+              for name, ball in must_be(Mapping, "tracks", tracks).items()}  # fmt: skip
     balls = list(tracks.values())
     if len(balls) < 2:
         raise ValueError(f"{len(balls)} tracks; needs two balls and more")
@@ -76,10 +78,11 @@ def velocities_from_tracks(
     given = {"length": length, "window": window, "scatter": scatter}
     length, window, scatter = (None if value is None else one_number(name, value, *ABOVE_ZERO)
                                for name, value in given.items())  # fmt: skip
-    for name, ball in tracks.items():
-        if (size := ball.times.size) < _LEAST:
-            raise ValueError(f"track {name!r} has {size} marks; needs {_LEAST} and more")
-        if length is not None and (span := float(np.ptp(ball.positions))) > 2.0 * length:
+    for name, (t, x) in tracks.items():
+        asked.refuse_where(f"times of {name}", t, np.diff(t, prepend=-np.inf) <= 0.0, "must rise")
+        if t.size < _LEAST:
+            raise ValueError(f"track {name!r} has {t.size} marks; needs {_LEAST} and more")
+        if length is not None and (span := float(np.ptp(x))) > 2.0 * length:
             told = f"track {name!r} spans {span:.3g} m, more than a pendulum of {length:g} m"
             raise ValueError(f"{told}; say the unit of the positions")
     frame = max(float(np.median(np.diff(ball.times))) for ball in balls)

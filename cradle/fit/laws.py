@@ -51,6 +51,7 @@ def fit_law(
 
     The velocities computed for a shot may all be off by one factor, within the error of those
     before.  If the chance of the chi-square is small, the law fails and the intervals mean nothing.
+    A ValueError says what is wrong, or what a law refuses; other errors are those of `collide`.
 
     Parameters
     ----------
@@ -65,11 +66,6 @@ def fit_law(
         Of all contacts, where it is not fitted.
     starts : int
         Number of points in the ranges from which minima are searched for.
-
-    Raises
-    ------
-    ValueError
-        If a range is wrong, a set has no law, there are too few velocities, or a law refuses.
 
     Examples
     --------

@@ -78,7 +78,7 @@ def fit_swing(
     87-94).  If the law fails (a large chi-square, or residuals alike from frame to frame), they are
     widened by how much parts of the film differ (clusters: Liang and Zeger, Biometrika 73, 1986,
     13-22).  The interval of the damping is too short if nearly all balls were pulled; where one has
-    no width the law jumps.  Wrong values, no ball in motion, too few readings: a ValueError.
+    no width the law jumps.  Errors: those of `swing`; too few readings, no motion: a ValueError.
 
     Parameters
     ----------
@@ -134,8 +134,8 @@ class _Film:
         self.model, self.balls = model, Chain(asked.row_of("masses", m, n, n), np.zeros(n), 1.0)
         self.times, self.seen = t - t[0], mask & np.isfinite(x)
         self.x = np.where(self.seen, x, np.nan)
-        free = (free,) if isinstance(free, str) else free
-        for name in (*free, *known):
+        free = (free,) if isinstance(free, str) else asked.must_be(Collection, "free", free)
+        for name in (*free, *asked.must_be(Mapping, "known", known)):
             asked.one_of("free or known", name, tuple(UNITS))
         for name, value in known.items():
             asked.one_number(f"known['{name}']", value, *_LIMITS[name])

@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cradle.input.csv import text_rows
-from cradle.input.values import ABOVE_ZERO, Vector, one_number
+from cradle.input.values import ABOVE_ZERO, Vector, checked, must_be, one_number
+from cradle.trace import compared_as_objects
 
 
+@compared_as_objects
 class Track(NamedTuple):
     """Marks of one ball in a film."""
 
@@ -117,10 +119,12 @@ def frames(tracks: Mapping[str, Track]) -> tuple[Vector, Vector]:
     >>> frames(tracks)[1].round(3).tolist()
     [[-0.1, nan], [0.0, 0.0], [0.2, 0.0]]
     """
-    times = np.unique(np.concatenate([ball.times for ball in tracks.values()]))
-    positions = np.full((times.size, len(tracks)), np.nan)
-    for k, (t, x) in enumerate(tracks.values()):
-        positions[np.searchsorted(times, t), k] = np.asarray(x) - np.median(x)
+    balls = [Track(*checked(f"tracks[{name!r}]", ball))
+             for name, ball in must_be(Mapping, "tracks", tracks).items()]  # fmt: skip
+    times = np.unique(np.concatenate([ball.times for ball in balls]))
+    positions = np.full((times.size, len(balls)), np.nan)
+    for k, (t, x) in enumerate(balls):
+        positions[np.searchsorted(times, t), k] = x - np.median(x)
     return times, positions
 
 
