@@ -41,7 +41,7 @@ class Trace:
         Velocities after the impact, m/s, and the total impulse of each contact, N s.
     absorbed : ndarray, shape (N - 1,)
         Work that each contact absorbed in compression, J, over all its collisions.  If the impact
-        collapsed, the sum of these is exact, and each of them is good to 1e-4.
+        collapsed, `energy_loss` is exact all the same, and each of these is good to 1e-4.
     collisions : ndarray of int, shape (N - 1,)
         How often each contact became active.  Do not rely on collisions slower than the last digit
         of the velocities: an endless sequence may stop there, without `collapsed`.
