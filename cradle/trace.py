@@ -58,7 +58,7 @@ class Trace:
         How near another sequence of events came, from 0 to 1: the least relative distance of two
         events of one run, of two meetings, or of a ratio from its bound.  Exact ties do not count.
         Below about 1e-12 a change in the last digit of the input may change the outcome.  It is 0
-        in three cases, which the book's reference explains: several ratios are tiny, two balls at
+        in three cases, which the book's reference explains: ratios are tiny, two or more balls at
         rest are struck from both sides, or one part collapsed while others still collided.  Models
         that `ImpulseCorrelation` does not solve leave it 1, not measured.
     left_out : int

@@ -37,7 +37,7 @@ class Estimate:
     modes: tuple[Mode, ...]  #: All minima of chi-square that were found, lowest first.
     identified: bool  #: False if the confidence set covers the whole range.
     at_bound: str  #: "lower" or "upper" if the lowest chi-square is at an end of the range, or "".
-    bound: float  #: Upper end of the range; the lower one is 0.
+    bound: float  #: Upper end of the range; the lower one is 0, of a period a quarter of it.
     grid: Vector  #: The P values that were tried, shape (P,).
     excess: Vector  #: Chi-square there, less its lowest value, shape (P,).
 

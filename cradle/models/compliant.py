@@ -189,8 +189,8 @@ def spring_outcomes(
 ) -> tuple[Vector, Vector]:  # fmt: skip
     """Velocities of many chains of balls on springs, and their estimated errors.
 
-    Arguments are those of `spring_velocities`.  Returned are the velocities, m/s, shape (..., N),
-    and the error of each chain, over its fastest closing speed, shape (...).
+    Arguments and errors are those of `spring_velocities`.  Returned are the velocities, m/s, shape
+    (..., N), and the estimated error of each chain, over its fastest closing speed, shape (...).
 
     Examples
     --------
