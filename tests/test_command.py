@@ -577,7 +577,10 @@ def test_fit_of_a_swing(folder):
     assert found["value"] == pytest.approx(0.9, abs=1e-3)  # three standard errors
     assert low < found["value"] < high < low + 2e-3
     assert told["reading"] == pytest.approx(1e-4, rel=0.2)
-    assert [told["poor"], json.loads(call(line))["poor"]] == [False, True]
+    pairs = json.loads(call(line))
+    assert [told["poor"], pairs["poor"]] == [False, True]
+    assert told["assumed"] == pairs["assumed"][:1] == ["equal gaps"]
+    assert pairs["assumed"][1:] == ["one pair collides after the other (--ratio)"]
 
 
 def scaled(text, size):

@@ -167,6 +167,13 @@ def test_one_bot_renews_the_lock():
     assert compiling == ["lock.yml"]
 
 
+def test_chapters_have_the_names_that_the_readmes_give():
+    pages = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "book").glob("*.ipynb"))
+    for name in ("README.md", "data/README.md", "environment-notes.md"):
+        told = re.findall(r'(?:chapter|appendix) "([^"]+)"', " ".join(text(name).split()))
+        assert [title for title in told if f'"# {title}' not in pages] == [], name
+
+
 def test_readme_on_pypi_has_no_relative_link():
     shown = release.absolute(text("README.md"))
     assert re.search(r"!\[[^\]]+\]\(https://[^)]+/cradle\.png\)", shown)

@@ -89,8 +89,7 @@ def film(
         try:
             told, one = _velocities(file, types, masses, units, length, window, striker)
         except (ValueError, OSError) as reason:  # the other films may be right
-            named = str(reason).startswith(file.name)
-            wrong.append(str(reason) if named else f"{file.name}: {reason}")
+            wrong.append(f"{file.name}: " * (not str(reason).startswith(file.name)) + str(reason))
             continue
         if header:
             writer.writerow(COLUMNS)
@@ -175,10 +174,11 @@ def fit_swing(
     found = fits.fit_swing(times, places, law, reading=reading, known=numbers, masses=masses)
     if plot is not None:
         save(plot, (5.6, 6), lambda figure: found.plot(figure.subplots(2, sharex=True)))
+    assumed = ["equal gaps", *["one pair collides after the other (--ratio)"] * (ratio is None)]
     if not (as_json or as_csv):
-        told = "; one pair collides after the other (--ratio)" * (ratio is None)
-        click.echo(f"{found.summary()}\nassumed: equal gaps{told}")
+        click.echo(f"{found.summary()}\nassumed: {'; '.join(assumed)}")
         return
     rows = [one.row() for one in found.estimates.values()]
     more = ("reading", "chi_square", "degrees_of_freedom", "correlation", "poor", "widened")
-    show(rows, {name: getattr(found, name) for name in more}, "", as_json, as_csv)
+    extra = {name: getattr(found, name) for name in more} | {"assumed": assumed}
+    show(rows, extra, "", as_json, as_csv)
