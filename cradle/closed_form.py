@@ -91,7 +91,7 @@ def one_collision_each(
 ) -> NDArray[np.bool_]:
     """Tell where three balls collide once per contact, so that equations 30 to 33 hold.
 
-    Contact 2-3 must still close when contact 1-2 ends, ball 2 not fall back (Eqs. 34, 43, 44).
+    Contact 2-3 still closes when contact 1-2 ends, ball 2 does not fall back (Eqs. 34, 43, 44).
     Arguments and errors are those of `three_balls`; the answer, shape (...), is False for its NaN.
 
     Examples

@@ -37,7 +37,7 @@ class SpringChain:
     The laws of force are those of `spring_velocities`.  In the trace, `absorbed` is the energy that
     a contact stores at each maximum of its compression, less that at the start or minimum before.
     Speeds below ``accuracy / 100`` of the fastest closing speed count as none, so how often balls
-    touch very gently depends on the accuracy.  From impulses the pull of strings is taken off.
+    touch very gently depends on the accuracy.  With leans, impulses leave out the strings' pull.
 
     Parameters
     ----------

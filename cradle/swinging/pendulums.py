@@ -27,8 +27,8 @@ class Pendulums:
         Rate at which a ball's amplitude decays, 1/s; for `swing` below the frequency sqrt(g/l).
     angle : {"small", "full"}
         "small": harmonic swings, too fast by 1 % at 0.4 rad, 7 % at 1 rad.  "full": true swings, of
-        equal lengths and one damping, so that contacts stay horizontal; gaps then are counted along
-        the arcs, right near the lowest point, and let balls go aside by a quarter of a circle.
+        equal lengths and one damping, so that contacts stay horizontal.  Gaps are counted along the
+        arcs then, right near the lowest point; with gaps balls go aside a quarter circle at most.
 
     Examples
     --------
